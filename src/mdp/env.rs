@@ -1,0 +1,124 @@
+//! What an environment is: dynamics, and how its states are named for scripts.
+
+use std::sync::Arc;
+
+use super::FiniteMdp;
+use super::numpy::NumpyRng;
+
+/// A discrete action: an index below [`Env::n_actions`].
+pub type Action = usize;
+
+/// How an episode ended. Kept apart everywhere: a terminated state has no future, a truncated
+/// one merely was not played on (Pardo et al. 2018).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Ending {
+    /// The environment reached a terminal state: its value is 0.
+    Terminated,
+    /// The time limit cut the episode off: the last state still has a value.
+    Truncated,
+}
+
+impl Ending {
+    /// The word used in files: `terminated` or `truncated`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Terminated => "terminated",
+            Self::Truncated => "truncated",
+        }
+    }
+}
+
+/// What one action brought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step<O> {
+    /// The next observation, s′.
+    pub obs: O,
+    /// The native reward, as the environment pays it.
+    pub reward: f64,
+    /// Whether s′ is terminal. Truncation is not the environment's business: the loop applies
+    /// the time limit.
+    pub terminated: bool,
+}
+
+/// Pure dynamics: no time limit, no shaping, no logging, infallible.
+///
+/// All randomness comes from the generator that is passed in, which stands for Gymnasium's
+/// `np_random`; the same seed therefore gives Gymnasium's own trajectory.
+pub trait Env: Send {
+    /// An observation: an array of float32 as Gymnasium returns it, or a state index.
+    type Obs: Copy + Send + Sync + std::fmt::Debug + 'static;
+
+    /// Number of discrete actions; valid ones are `0..n_actions`.
+    fn n_actions(&self) -> usize;
+
+    /// Starts an episode and returns its first observation.
+    fn reset(&mut self, rng: &mut NumpyRng) -> Self::Obs;
+
+    /// Plays `action` (below [`Self::n_actions`]; the caller has checked).
+    fn step(&mut self, action: Action, rng: &mut NumpyRng) -> Step<Self::Obs>;
+
+    /// The model, for environments that step a [`FiniteMdp`].
+    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
+        None
+    }
+
+    /// The index of the state in [`Self::finite`]'s model; `None` on continuous environments.
+    fn state_index(&self, _obs: &Self::Obs) -> Option<usize> {
+        None
+    }
+
+    /// The names of the state's numbers, in the order of [`Self::fields`]' output.
+    fn schema(&self) -> Schema;
+
+    /// Writes the numbers that [`Self::schema`] names into `out` (length `schema().fields.len()`):
+    /// what scripts see as `s.name` and `s[i]`.
+    fn fields(&self, obs: &Self::Obs, out: &mut [f64]);
+}
+
+/// How a field appears in a script.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FieldKind {
+    /// A float.
+    Float,
+    /// An integer (stored exactly in an f64).
+    Int,
+    /// A one-letter string; the f64 holds its Unicode scalar value.
+    Letter,
+}
+
+/// One named number of a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Field {
+    /// Its name in scripts, for example `theta_dot`.
+    pub name: &'static str,
+    /// Its type in scripts.
+    pub kind: FieldKind,
+    /// One line: what it is, with its unit.
+    pub doc: &'static str,
+    /// The smallest value the observation space admits (may be infinite).
+    pub low: f64,
+    /// The largest value the observation space admits (may be infinite).
+    pub high: f64,
+}
+
+/// The fields of an environment's states, and the facts that are the same in all of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schema {
+    /// Per-state numbers: `s.name`, or `s[i]` by position.
+    pub fields: Vec<Field>,
+    /// Facts about this instance, readable as `s.name` too: `rows`, `goal_col`, ….
+    pub facts: Vec<(&'static str, FieldKind, f64)>,
+    /// What each action is called, in order: `["left", "down", "right", "up"]`.
+    pub actions: &'static [&'static str],
+    /// The map, if the environment is a grid world whose state index is `row * cols + col`.
+    pub grid: Option<Grid>,
+}
+
+/// A grid world's map, for drawing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Grid {
+    /// The tiles, one string of equal length per row.
+    pub rows: Vec<String>,
+    /// An arrow per action, in action order: `←↓→↑`.
+    pub arrows: &'static [char],
+}

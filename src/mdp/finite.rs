@@ -1,0 +1,234 @@
+//! Finite Markov decision processes: one transition table for planning and for stepping.
+
+use std::sync::Arc;
+
+use super::numpy::NumpyRng;
+
+/// One possible result of an action: Gymnasium's `(prob, next_state, reward, terminated)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Its probability.
+    pub probability: f64,
+    /// The state it leads to.
+    pub next_state: u32,
+    /// The native reward on the way.
+    pub reward: f64,
+    /// Whether the episode ends there. Terminality belongs to the transition, not to the state.
+    pub terminated: bool,
+}
+
+/// A state of a finite environment, and the outcome that led to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FiniteState {
+    /// The state index: Gymnasium's observation.
+    pub index: u32,
+    /// Index into [`FiniteMdp::outcomes`] of the transition just taken; [`FiniteState::START`]
+    /// after a reset. Rewards tabulated per transition are looked up by it.
+    pub outcome: u32,
+}
+
+impl FiniteState {
+    /// The value of `outcome` right after a reset.
+    pub const START: u32 = u32::MAX;
+}
+
+/// A finite MDP, stored as one flat list of outcomes.
+///
+/// Shapes: `offsets` has `n_states * n_actions + 1` entries; the outcomes of (s, a) are
+/// `outcomes[offsets[s * n_actions + a]..offsets[s * n_actions + a + 1]]`, in the order in which
+/// they are sampled (which matters for seed-exactness).
+#[derive(Debug, Clone, PartialEq)]
+pub struct FiniteMdp {
+    n_states: usize,
+    n_actions: usize,
+    offsets: Vec<u32>,
+    outcomes: Vec<Outcome>,
+    initial: Vec<f64>,
+}
+
+/// Why a table is not a [`FiniteMdp`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct FiniteMdpError(pub String);
+
+impl std::fmt::Display for FiniteMdpError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for FiniteMdpError {}
+
+impl FiniteMdp {
+    /// Builds the table. `table[s][a]` lists the outcomes of action `a` in state `s`; `initial`
+    /// holds one probability per state (not normalised: it is sampled as NumPy would).
+    ///
+    /// # Errors
+    /// If there are no states or actions, rows differ in length, a list of outcomes is empty, or
+    /// a next state is out of range.
+    pub fn new(table: &[Vec<Vec<Outcome>>], initial: Vec<f64>) -> Result<Self, FiniteMdpError> {
+        let n_states = table.len();
+        let n_actions = table.first().map_or(0, Vec::len);
+        if n_states == 0 || n_actions == 0 {
+            return Err(FiniteMdpError("a model needs at least one state and one action".into()));
+        }
+        if initial.len() != n_states {
+            return Err(FiniteMdpError(format!(
+                "{} initial probabilities for {n_states} states",
+                initial.len()
+            )));
+        }
+        let mut offsets = Vec::with_capacity(n_states * n_actions + 1);
+        let mut outcomes = Vec::new();
+        offsets.push(0);
+        for (s, row) in table.iter().enumerate() {
+            if row.len() != n_actions {
+                return Err(FiniteMdpError(format!(
+                    "state {s} has {} actions, state 0 has {n_actions}",
+                    row.len()
+                )));
+            }
+            for (a, list) in row.iter().enumerate() {
+                if list.is_empty() {
+                    return Err(FiniteMdpError(format!("no outcome for action {a} in state {s}")));
+                }
+                if let Some(bad) = list.iter().find(|o| o.next_state as usize >= n_states) {
+                    return Err(FiniteMdpError(format!(
+                        "action {a} in state {s} leads to state {}, but there are {n_states}",
+                        bad.next_state
+                    )));
+                }
+                outcomes.extend_from_slice(list);
+                offsets.push(outcomes.len() as u32);
+            }
+        }
+        Ok(Self { n_states, n_actions, offsets, outcomes, initial })
+    }
+
+    /// Number of states.
+    pub fn n_states(&self) -> usize {
+        self.n_states
+    }
+
+    /// Number of actions.
+    pub fn n_actions(&self) -> usize {
+        self.n_actions
+    }
+
+    /// Initial-state probabilities, one per state.
+    pub fn initial(&self) -> &[f64] {
+        &self.initial
+    }
+
+    /// Every outcome of the model.
+    pub fn outcomes(&self) -> &[Outcome] {
+        &self.outcomes
+    }
+
+    /// The range of [`Self::outcomes`] that belongs to (s, a).
+    #[inline]
+    pub fn range(&self, s: usize, a: usize) -> std::ops::Range<usize> {
+        let i = s * self.n_actions + a;
+        self.offsets[i] as usize..self.offsets[i + 1] as usize
+    }
+
+    /// The outcomes of action `a` in state `s`, in sampling order.
+    #[inline]
+    pub fn of(&self, s: usize, a: usize) -> &[Outcome] {
+        &self.outcomes[self.range(s, a)]
+    }
+
+    /// Whether an episode can be *in* state `s` and act: reachable from an initial state by
+    /// non-terminal transitions of positive probability. Tables hold junk elsewhere.
+    ///
+    /// Returns one flag per state.
+    pub fn reachable(&self) -> Vec<bool> {
+        let mut seen = vec![false; self.n_states];
+        let mut stack: Vec<usize> =
+            (0..self.n_states).filter(|&s| self.initial[s] > 0.0 || self.initial[s].is_nan()).collect();
+        if stack.is_empty() || self.initial.iter().any(|p| p.is_nan()) {
+            // NumPy's sampling falls back to state 0 when no cumulative sum exceeds the draw.
+            stack = vec![0];
+        }
+        for &s in &stack {
+            seen[s] = true;
+        }
+        while let Some(s) = stack.pop() {
+            for a in 0..self.n_actions {
+                for o in self.of(s, a) {
+                    let next = o.next_state as usize;
+                    if o.probability > 0.0 && !o.terminated && !seen[next] {
+                        seen[next] = true;
+                        stack.push(next);
+                    }
+                }
+            }
+        }
+        seen
+    }
+
+    /// The same dynamics with other rewards: `reward(s, a, outcome)` replaces each.
+    #[must_use]
+    pub fn with_rewards(&self, mut reward: impl FnMut(usize, usize, &Outcome) -> f64) -> Self {
+        let mut shaped = self.clone();
+        for s in 0..self.n_states {
+            for a in 0..self.n_actions {
+                for i in self.range(s, a) {
+                    shaped.outcomes[i].reward = reward(s, a, &self.outcomes[i]);
+                }
+            }
+        }
+        shaped
+    }
+}
+
+/// Samples an index as Gymnasium's `categorical_sample`: one uniform draw, always; the first
+/// index whose running float64 sum exceeds it; 0 if none does.
+#[inline]
+fn categorical(probabilities: impl Iterator<Item = f64>, rng: &mut NumpyRng) -> usize {
+    let u = rng.random();
+    let mut sum = 0.0;
+    for (i, p) in probabilities.enumerate() {
+        sum += p;
+        if sum > u {
+            return i;
+        }
+    }
+    0
+}
+
+/// Steps a [`FiniteMdp`]: the simulator and the model are the same table.
+#[derive(Debug, Clone)]
+pub struct FiniteEnv {
+    mdp: Arc<FiniteMdp>,
+    state: u32,
+}
+
+impl FiniteEnv {
+    /// A simulator of `mdp`, in state 0 until the first reset.
+    pub fn new(mdp: Arc<FiniteMdp>) -> Self {
+        Self { mdp, state: 0 }
+    }
+
+    /// The model.
+    pub fn mdp(&self) -> &Arc<FiniteMdp> {
+        &self.mdp
+    }
+
+    /// Starts an episode: samples the initial distribution.
+    #[inline]
+    pub fn reset(&mut self, rng: &mut NumpyRng) -> FiniteState {
+        self.state = categorical(self.mdp.initial.iter().copied(), rng) as u32;
+        FiniteState { index: self.state, outcome: FiniteState::START }
+    }
+
+    /// Samples an outcome of `action` and moves there. Returns it with the new state.
+    #[inline]
+    pub fn step(&mut self, action: usize, rng: &mut NumpyRng) -> (FiniteState, &Outcome) {
+        let range = self.mdp.range(self.state as usize, action);
+        let outcomes = &self.mdp.outcomes[range.clone()];
+        let i = categorical(outcomes.iter().map(|o| o.probability), rng);
+        let outcome = &outcomes[i];
+        self.state = outcome.next_state;
+        (FiniteState { index: self.state, outcome: (range.start + i) as u32 }, outcome)
+    }
+}
