@@ -67,6 +67,17 @@ pub trait Env: Send {
         None
     }
 
+    /// The observation of state `index` of [`Self::finite`]'s model, as after a reset.
+    fn state(&self, _index: usize) -> Option<Self::Obs> {
+        None
+    }
+
+    /// Which outcome of [`Self::finite`]'s model led to `obs`; `None` after a reset and on
+    /// continuous environments.
+    fn outcome_index(&self, _obs: &Self::Obs) -> Option<usize> {
+        None
+    }
+
     /// The names of the state's numbers, in the order of [`Self::fields`]' output.
     fn schema(&self) -> Schema;
 

@@ -143,8 +143,9 @@ impl FiniteMdp {
     /// Returns one flag per state.
     pub fn reachable(&self) -> Vec<bool> {
         let mut seen = vec![false; self.n_states];
-        let mut stack: Vec<usize> =
-            (0..self.n_states).filter(|&s| self.initial[s] > 0.0 || self.initial[s].is_nan()).collect();
+        let mut stack: Vec<usize> = (0..self.n_states)
+            .filter(|&s| self.initial[s] > 0.0 || self.initial[s].is_nan())
+            .collect();
         if stack.is_empty() || self.initial.iter().any(|p| p.is_nan()) {
             // NumPy's sampling falls back to state 0 when no cumulative sum exceeds the draw.
             stack = vec![0];

@@ -1,0 +1,118 @@
+//! `runner check SCRIPT..`
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+use super::output::{diagnostic, note, out};
+use super::{Failure, Outcome};
+use crate::experiment::check;
+use crate::script::{Callback, DiscretiserSpec, PhiOn, Plan, Variant, load};
+
+#[derive(Debug, ClapArgs)]
+pub(super) struct Args {
+    /// The scripts
+    #[arg(required = true)]
+    scripts: Vec<PathBuf>,
+}
+
+/// Checks every script, so that one mistake does not hide the others.
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let mut last = None;
+    for script in &args.scripts {
+        match load(script).and_then(|plan| check(&plan).map(|()| plan)) {
+            Ok(plan) => {
+                for warning in &plan.warnings {
+                    diagnostic(warning);
+                }
+                for line in &plan.printed {
+                    note(line);
+                }
+                out(&describe(&plan))?;
+            }
+            Err(d) => {
+                if let Some(earlier) = last.replace(d) {
+                    diagnostic(&earlier);
+                }
+            }
+        }
+    }
+    match last {
+        Some(d) => Err(d.into()),
+        None => Ok(Outcome::Fine),
+    }
+}
+
+const MEMORY: &str = "writing to a string does not fail";
+
+/// The plan in words.
+fn describe(plan: &Plan) -> String {
+    let mut text = String::new();
+    let units: usize = plan.variants.iter().map(|v| v.seeds.0.len()).sum();
+    let s = if plan.variants.len() == 1 { "" } else { "s" };
+    writeln!(
+        text,
+        "{}: study \"{}\", {} variant{s}, {units} units",
+        plan.sources.script.name,
+        plan.name,
+        plan.variants.len()
+    )
+    .expect(MEMORY);
+    for variant in &plan.variants {
+        writeln!(text, "  {}", variant.name).expect(MEMORY);
+        for (what, how) in rows(variant) {
+            writeln!(text, "    {what:<12} {how}").expect(MEMORY);
+        }
+    }
+    for expectation in &plan.expectations {
+        writeln!(text, "  expects: {}", expectation.text).expect(MEMORY);
+    }
+    text
+}
+
+fn rows(v: &Variant) -> Vec<(&'static str, String)> {
+    let kwargs: Vec<String> = v.kwargs.iter().map(|(k, x)| format!("{k}: {x}")).collect();
+    let params: Vec<String> = v.agent.params.iter().map(|(k, x)| format!("{k}: {x}")).collect();
+    let limit =
+        v.max_steps.map_or("without a step limit".into(), |n| format!("of at most {n} steps"));
+    let mut rows = vec![
+        ("environment", format!("{} ({})", v.env.id, kwargs.join(", "))),
+        ("agent", format!("{}({})", v.agent.spec.name, params.join(", "))),
+    ];
+    match &v.discretiser {
+        DiscretiserSpec::StateIndex => {}
+        DiscretiserSpec::Bins(dims) => {
+            let sizes: Vec<String> = dims.iter().map(|d| d.n.to_string()).collect();
+            let cells: usize = dims.iter().map(|d| d.n).product();
+            rows.push(("discretiser", format!("{} bins = {cells} cells", sizes.join(" × "))));
+        }
+        DiscretiserSpec::Cells { shape, cell } => {
+            let cells: usize = shape.iter().product();
+            rows.push(("discretiser", format!("{}, {cells} cells", at(cell))));
+        }
+    }
+    rows.push(("training", format!("{} seeds × {} episodes {limit}", v.seeds.0.len(), v.episodes)));
+    if let Some(potential) = &v.potential {
+        let on = match (&v.discretiser, v.potential_on) {
+            (DiscretiserSpec::StateIndex, _) => "tabulated over the states",
+            (_, PhiOn::Cell) => "once per cell, on its representative",
+            (_, PhiOn::Raw) => "on the raw state, interpreted at every step",
+        };
+        rows.push(("potential", format!("{}, {on}", at(potential))));
+    }
+    if let Some(reward) = &v.reward {
+        rows.push(("reward", at(reward)));
+    }
+    for (name, term) in &v.terms {
+        rows.push(("term", format!("{name}: {}", at(term))));
+    }
+    rows
+}
+
+fn at(callback: &Callback) -> String {
+    match &callback.place {
+        Some(p) => format!("{} (line {})", callback.label, p.line),
+        None => callback.label.clone(),
+    }
+}

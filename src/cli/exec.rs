@@ -1,0 +1,212 @@
+//! `runner exec SCRIPT`
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use clap::Args as ClapArgs;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+
+use super::output::{diagnostic, note, out};
+use super::{Failure, Outcome};
+use crate::experiment::{Audit, ExecuteError, Execution, Progress, audit_variant, check, execute};
+use crate::report::results::{Findings, FolderError, Results, variant_json};
+use crate::report::table::{StudyTable, TableRow};
+use crate::script::{Host, Plan, SeedList, load};
+
+#[derive(Debug, ClapArgs)]
+pub(super) struct Args {
+    /// The script
+    script: PathBuf,
+    /// Folder for the results [default: results/<study>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Run only the first N seeds of each variant, or as many more from 0 on
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    seeds: Option<u32>,
+    /// Episodes per seed, instead of the script's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
+    episodes: Option<u32>,
+    /// Threads [default: all cores]; results do not depend on it
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// No progress bar and no table
+    #[arg(long, short)]
+    quiet: bool,
+    /// Run everything again, even what is already there
+    #[arg(long)]
+    fresh: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let mut plan = load(&args.script)?;
+    restrict(&mut plan, args);
+    say(&plan, args.quiet);
+    check(&plan)?;
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("results").join(&plan.name));
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let jobs = args.jobs.map_or(cores, usize::from);
+    let results = Results::open(&folder, &plan, jobs, args.fresh)
+        .map_err(|FolderError { message, hint }| Failure::Message(message, hint))?;
+    let Some(execution) = train(&plan, &results, jobs, args)? else { return Ok(Outcome::Stopped) };
+    let host = Host::open(&plan)?;
+    let audits: Vec<Audit> =
+        plan.variants.iter().map(|v| audit_variant(&host, v)).collect::<Result<_, _>>()?;
+    let findings = results.derive(&plan, &execution, audits)?;
+    if !args.quiet {
+        out(&table(&plan, &findings).render())?;
+    }
+    let held = expectations(&plan, &host, &findings, args.quiet)?;
+    if !args.quiet {
+        note(&format!("results in {}", folder.display()));
+    }
+    Ok(if held { Outcome::Fine } else { Outcome::Failed })
+}
+
+/// Applies `--seeds` and `--episodes`.
+fn restrict(plan: &mut Plan, args: &Args) {
+    for variant in &mut plan.variants {
+        if let Some(episodes) = args.episodes {
+            variant.episodes = episodes;
+        }
+        if let Some(n) = args.seeds {
+            let n = n as usize;
+            let own = &variant.seeds.0;
+            variant.seeds = SeedList(if n <= own.len() {
+                own[..n].to_vec()
+            } else {
+                let mut seeds = own.clone();
+                seeds.extend((0..).filter(|s| !own.contains(s)).take(n - own.len()));
+                seeds
+            });
+        }
+    }
+}
+
+/// Warnings, and what the script printed.
+fn say(plan: &Plan, quiet: bool) {
+    for warning in &plan.warnings {
+        diagnostic(warning);
+    }
+    if !quiet {
+        for line in &plan.printed {
+            note(line);
+        }
+    }
+}
+
+/// Runs the plan's units with a progress bar; `None` if it was stopped.
+fn train(
+    plan: &Plan,
+    results: &Results,
+    jobs: usize,
+    args: &Args,
+) -> Result<Option<Execution>, Failure> {
+    // The signal handler outlives this function.
+    let progress: &'static Progress = Box::leak(Box::default());
+    // A second handler cannot be set; only one run happens per process.
+    let _ = ctrlc::set_handler(|| {
+        if progress.stop.swap(true, Ordering::Relaxed) {
+            #[expect(clippy::disallowed_methods, reason = "asked twice: at once, and for good")]
+            std::process::exit(75);
+        }
+    });
+    let total: u64 =
+        plan.variants.iter().map(|v| u64::from(v.episodes) * v.seeds.0.len() as u64).sum();
+    let bar = bar(total, args.quiet, progress);
+    let done = std::sync::atomic::AtomicBool::new(false);
+    let result = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !done.load(Ordering::Relaxed) {
+                bar.set_position(progress.episodes.load(Ordering::Relaxed));
+                std::thread::sleep(Duration::from_millis(50));
+            }
+        });
+        let result = execute(plan, &results.store, jobs, progress);
+        done.store(true, Ordering::Relaxed);
+        result
+    });
+    bar.finish_and_clear();
+    match result {
+        Ok(execution) => Ok(Some(execution)),
+        Err(ExecuteError::Script(d)) => Err(Failure::Script(d)),
+        Err(ExecuteError::Store(e)) => Err(e.into()),
+        Err(ExecuteError::Interrupted { done, total }) => {
+            note(&format!(
+                "stopped: {done} of {total} units are stored in {}\nto go on: {}",
+                results.folder.display(),
+                resume(args)
+            ));
+            Ok(None)
+        }
+    }
+}
+
+/// The command that goes on where this one stopped.
+fn resume(args: &Args) -> String {
+    let mut command = format!("runner exec {}", args.script.display());
+    let mut add = |flag: &str, value: Option<String>| {
+        if let Some(value) = value {
+            command.push_str(&format!(" {flag} {value}"));
+        }
+    };
+    add("--out", args.out.as_ref().map(|p| p.display().to_string()));
+    add("--seeds", args.seeds.map(|n| n.to_string()));
+    add("--episodes", args.episodes.map(|n| n.to_string()));
+    add("--jobs", args.jobs.map(|n| n.to_string()));
+    command
+}
+
+fn bar(total: u64, quiet: bool, progress: &'static Progress) -> ProgressBar {
+    let bar = ProgressBar::new(total);
+    if quiet {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    let steps = move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
+        let seconds = state.elapsed().as_secs_f64().max(1e-9);
+        let rate = progress.steps.load(Ordering::Relaxed) as f64 / seconds;
+        let _ = write!(w, "{:.1} M steps/s", rate / 1e6);
+    };
+    let style = ProgressStyle::with_template(
+        "{bar:30} {human_pos}/{human_len} episodes  {steps}  {eta} left",
+    )
+    .map(|style| style.with_key("steps", steps));
+    if let Ok(style) = style {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn table(plan: &Plan, findings: &Findings) -> StudyTable {
+    let rows = findings.summaries.iter().enumerate().map(|(i, summary)| {
+        TableRow::new(summary, findings.steps_per_second[i], findings.audits[i].label())
+    });
+    let windows = plan.variants.iter().map(|v| v.window).max().unwrap_or(1);
+    let notes = vec![format!(
+        "final: native return, rolling mean over {windows} episodes at the end of training"
+    )];
+    StudyTable { rows: rows.collect(), notes }
+}
+
+/// Checks every claim; returns whether all hold.
+fn expectations(
+    plan: &Plan,
+    host: &Host,
+    findings: &Findings,
+    quiet: bool,
+) -> Result<bool, Failure> {
+    let mut results = serde_json::Map::new();
+    for (summary, audit) in findings.summaries.iter().zip(&findings.audits) {
+        results.insert(summary.name.clone(), variant_json(summary, audit));
+    }
+    let results = serde_json::Value::Object(results);
+    let mut all = true;
+    for expectation in &plan.expectations {
+        let holds = host.callbacks().holds(&expectation.check, &results)?;
+        all &= holds;
+        if !quiet || !holds {
+            note(&format!("{} {}", if holds { "ok    " } else { "FAILED" }, expectation.text));
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,112 @@
+//! `runner list envs|agents|functions|keys|examples`
+
+use std::fmt::Write;
+use std::path::Path;
+
+use clap::{Args as ClapArgs, ValueEnum};
+
+use super::output::out;
+use super::{Failure, Outcome};
+use crate::env::specs;
+use crate::learn::registry::AGENTS;
+use crate::script::functions::functions;
+use crate::script::keys::KEYS;
+
+#[derive(Debug, ClapArgs)]
+pub(super) struct Args {
+    /// What to list
+    what: What,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum What {
+    /// Environments with their arguments
+    Envs,
+    /// Agents with their parameters
+    Agents,
+    /// Functions that scripts can call
+    Functions,
+    /// Keys of an experiment
+    Keys,
+    /// Example scripts in ./scripts
+    Examples,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let text = match args.what {
+        What::Envs => envs()?,
+        What::Agents => agents(),
+        What::Functions => rows(functions().iter().map(|f| (f.signature.as_str(), f.doc))),
+        What::Keys => keys(),
+        What::Examples => examples(),
+    };
+    out(&text)?;
+    Ok(Outcome::Fine)
+}
+
+const MEMORY: &str = "writing to a string does not fail";
+
+fn rows<'a>(items: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+    items.fold(String::new(), |mut text, (name, doc)| {
+        writeln!(text, "{name}\n    {doc}").expect(MEMORY);
+        text
+    })
+}
+
+fn envs() -> Result<String, Failure> {
+    let mut text = String::new();
+    for spec in specs() {
+        let limit = spec.max_steps.map_or("no step limit".into(), |n| format!("{n} steps"));
+        let solved = spec.reward_threshold.map_or(String::new(), |x| format!(", solved at {x}"));
+        writeln!(text, "{}\n    {} ({limit}{solved})", spec.id, spec.summary).expect(MEMORY);
+        let env = spec.make(&serde_json::Map::new())?;
+        let schema = env.schema();
+        let fields: Vec<&str> =
+            schema.fields.iter().map(|f| f.name).chain(schema.facts.iter().map(|f| f.0)).collect();
+        writeln!(text, "    state: {}", fields.join(", ")).expect(MEMORY);
+        let actions = schema.actions.iter().enumerate().map(|(i, a)| format!("{i} {a}"));
+        writeln!(text, "    actions: {}", actions.collect::<Vec<_>>().join(", ")).expect(MEMORY);
+        for arg in spec.kwargs() {
+            writeln!(text, "    {} = {}: {}", arg.name, arg.default, arg.doc).expect(MEMORY);
+        }
+    }
+    Ok(text)
+}
+
+fn agents() -> String {
+    let mut text = String::new();
+    for spec in AGENTS {
+        writeln!(text, "{}\n    {}", spec.name, spec.doc).expect(MEMORY);
+        for p in spec.params {
+            writeln!(text, "    {} = {}: {} ({})", p.name, p.default, p.doc, p.kind.allowed())
+                .expect(MEMORY);
+        }
+    }
+    text
+}
+
+fn keys() -> String {
+    KEYS.iter().fold(String::new(), |mut text, key| {
+        writeln!(text, "{}: {}\n    {}", key.name, key.kind, key.doc).expect(MEMORY);
+        text
+    })
+}
+
+/// The scripts in `./scripts`, each with its first comment line.
+fn examples() -> String {
+    let Ok(entries) = std::fs::read_dir(Path::new("scripts")) else {
+        return "there is no folder scripts/ here; `runner new NAME` writes a script\n".into();
+    };
+    let mut paths: Vec<_> = entries
+        .filter_map(|e| e.ok().map(|e| e.path()))
+        .filter(|p| p.extension().is_some_and(|x| x == "rhai"))
+        .collect();
+    paths.sort();
+    let mut text = String::new();
+    for path in paths {
+        let source = std::fs::read_to_string(&path).unwrap_or_default();
+        let about = source.lines().find_map(|l| l.strip_prefix("// ")).unwrap_or_default();
+        writeln!(text, "{}\n    {about}", path.display()).expect(MEMORY);
+    }
+    text
+}

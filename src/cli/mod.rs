@@ -1,0 +1,125 @@
+//! The command line: one file a subcommand. Each parses, calls the library and prints.
+//!
+//! Machine-readable output goes to stdout, everything for humans to stderr. Exit codes: 0 fine;
+//! 1 it ran, but an expectation, a golden file or a parity check failed; 2 bad input or usage;
+//! 75 stopped, can be resumed.
+
+mod check;
+mod completions;
+mod exec;
+mod golden;
+mod list;
+mod new;
+mod output;
+mod parity;
+mod rollout;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::script::Diagnostic;
+
+/// A scriptable reinforcement-learning experiment runner.
+#[derive(Debug, Parser)]
+#[command(name = "runner", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a script: train every variant under every seed, compare, plot
+    Exec(exec::Args),
+    /// Compile scripts, call every callback on sampled states, print the plan
+    Check(check::Args),
+    /// List environments, agents, functions, keys or examples
+    List(list::Args),
+    /// Play actions in an environment and print what happens
+    Rollout(rollout::Args),
+    /// Replay recorded Gymnasium trajectories and compare
+    Parity(parity::Args),
+    /// Compare what scripts learn with their golden files
+    Golden(golden::Args),
+    /// Write a new script to start from
+    New(new::Args),
+    /// Print shell completions
+    Completions(completions::Args),
+}
+
+/// How a command came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// All is well: exit code 0.
+    Fine,
+    /// It ran, and something checked did not hold: exit code 1.
+    Failed,
+    /// Stopped by a signal, to be resumed: exit code 75 (`EX_TEMPFAIL`).
+    Stopped,
+}
+
+/// Bad input or usage: exit code 2. What to tell the user.
+#[derive(Debug)]
+enum Failure {
+    /// A mistake in a script.
+    Script(Box<Diagnostic>),
+    /// Anything else, with advice if there is any.
+    Message(String, Option<String>),
+    /// The reader of our output has gone away: nothing is wrong.
+    BrokenPipe,
+}
+
+impl From<Diagnostic> for Failure {
+    fn from(d: Diagnostic) -> Self {
+        Self::Script(Box::new(d))
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(e: std::io::Error) -> Self {
+        if e.kind() == std::io::ErrorKind::BrokenPipe {
+            Self::BrokenPipe
+        } else {
+            Self::Message(e.to_string(), None)
+        }
+    }
+}
+
+impl From<crate::env::EnvError> for Failure {
+    fn from(e: crate::env::EnvError) -> Self {
+        Self::Message(e.message, e.hint)
+    }
+}
+
+impl From<crate::experiment::StoreError> for Failure {
+    fn from(e: crate::experiment::StoreError) -> Self {
+        Self::Message(e.to_string(), None)
+    }
+}
+
+/// Parses the arguments, runs the command, maps its outcome to an exit code.
+pub fn main() -> ExitCode {
+    match run(Cli::parse()) {
+        Ok(Outcome::Fine) | Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
+        Ok(Outcome::Failed) => ExitCode::from(1),
+        Ok(Outcome::Stopped) => ExitCode::from(75),
+        Err(failure) => {
+            output::failure(&failure);
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<Outcome, Failure> {
+    match cli.command {
+        Command::Exec(args) => exec::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::List(args) => list::run(&args),
+        Command::Rollout(args) => rollout::run(&args),
+        Command::Parity(args) => parity::run(&args),
+        Command::Golden(args) => golden::run(&args),
+        Command::New(args) => new::run(&args),
+        Command::Completions(args) => completions::run(&args),
+    }
+}

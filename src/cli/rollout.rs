@@ -1,0 +1,82 @@
+//! `runner rollout ENV`
+
+use std::io::Write;
+
+use clap::{Args as ClapArgs, ValueEnum};
+
+use super::{Failure, Outcome};
+use crate::env::rollout::{RolloutError, parse_actions, rollout, rollout_actions};
+use crate::env::{Observation, Session};
+use crate::mdp::numpy::Seed;
+use crate::mdp::streams::Stream;
+
+#[derive(Debug, ClapArgs)]
+pub(super) struct Args {
+    /// The environment's id
+    env: String,
+    /// Constructor arguments as JSON, for example '{"is_slippery": false}'
+    #[arg(long, value_name = "JSON", default_value = "{}")]
+    kwargs: String,
+    /// Seed of the first reset, as in Gymnasium's reset(seed=N)
+    #[arg(long, value_name = "N", default_value = "0")]
+    seed: String,
+    /// Actions to play, separated by commas
+    #[arg(long, value_name = "A,B,..", conflicts_with = "policy", allow_hyphen_values = true)]
+    actions: Option<String>,
+    /// Who plays if no actions are given
+    #[arg(long, value_enum, default_value = "random")]
+    policy: Policy,
+    /// Number of steps that the policy plays
+    #[arg(long, value_name = "N", default_value_t = 100, conflicts_with = "actions")]
+    steps: usize,
+    /// How it is printed
+    #[arg(long, value_enum, default_value = "jsonl")]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Policy {
+    /// Uniformly random actions, from the seed
+    Random,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Format {
+    /// One JSON object a line
+    Jsonl,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let kwargs: serde_json::Value = serde_json::from_str(&args.kwargs).map_err(|e| {
+        Failure::Message(
+            format!("--kwargs is not JSON: {e}"),
+            Some("write, for example, --kwargs '{\"is_slippery\": false}'".into()),
+        )
+    })?;
+    let serde_json::Value::Object(kwargs) = kwargs else {
+        return Err(Failure::Message(format!("--kwargs is a JSON object, got {kwargs}"), None));
+    };
+    let seed: Seed =
+        args.seed.parse().map_err(|e| Failure::Message(format!("--seed: {e}"), None))?;
+    let mut session = Session::new(&args.env, &kwargs)?;
+    let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
+    let (Format::Jsonl, Policy::Random) = (args.format, args.policy);
+    let played = match &args.actions {
+        Some(actions) => {
+            let actions = parse_actions(actions)?;
+            rollout_actions(&mut session, &seed, &actions, &mut stdout)
+        }
+        None => {
+            let n_actions = session.schema().actions.len();
+            let mut stream = Stream::new(seed.words()[0].into(), "policy");
+            let policy = |_: &Observation| stream.below(n_actions) as i64;
+            rollout(&mut session, &seed, args.steps, policy, &mut stdout)
+        }
+    };
+    let flushed = stdout.flush();
+    match played {
+        Ok(()) => flushed.map(|()| Outcome::Fine).map_err(Failure::from),
+        Err(RolloutError::Env(e)) => Err(e.into()),
+        Err(RolloutError::Io(e)) => Err(e.into()),
+    }
+}

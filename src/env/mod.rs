@@ -1,0 +1,28 @@
+//! The environments: one file each, one line each in the registry.
+//!
+//! - [`registry`]: [`specs`], [`find`], [`make`]: from an id and arguments to an [`AnyEnv`], and by
+//!   an [`EnvVisitor`] to static dispatch
+//! - [`cart_pole`], [`mountain_car`], [`frozen_lake`]: the dynamics, documented under Gymnasium's
+//!   headings
+//! - [`Registered`]: what an environment provides beyond its dynamics; [`KwargSpec`], [`Kwargs`]:
+//!   its constructor's arguments; [`EnvError`]: what can be wrong with them
+//! - [`Session`]: an environment as `gymnasium.make` returns it, dynamic, with its time limit
+//! - [`rollout`]: an episode as JSON lines; [`recording`]: replaying recorded trajectories
+
+mod bounds;
+pub mod cart_pole;
+mod error;
+pub mod frozen_lake;
+mod kwargs;
+pub mod mountain_car;
+pub mod recording;
+mod registered;
+pub mod registry;
+pub mod rollout;
+mod session;
+
+pub use error::EnvError;
+pub use kwargs::{KwargKind, KwargSpec, Kwargs};
+pub use registered::{Observation, Registered};
+pub use registry::{AnyEnv, EnvSpec, EnvVisitor, find, make, specs};
+pub use session::{Session, SessionStep, time_limit};

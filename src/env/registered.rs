@@ -1,0 +1,74 @@
+//! What an environment provides beyond its dynamics to stand in the registry.
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::error::EnvError;
+use super::kwargs::{KwargSpec, Kwargs};
+use crate::mdp::numpy::NumpyRng;
+use crate::mdp::{Env, FiniteState};
+
+/// An observation whose type is known at run time only. Serialises as Gymnasium's would: a bare
+/// integer, or a list of float32 in the shortest decimal that reads back as the same float32.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Observation {
+    /// A state index (`Discrete`).
+    Index(i64),
+    /// An array of float32 (`Box`).
+    Box(Vec<f32>),
+}
+
+impl<const N: usize> From<[f32; N]> for Observation {
+    fn from(obs: [f32; N]) -> Self {
+        Self::Box(obs.to_vec())
+    }
+}
+
+impl From<FiniteState> for Observation {
+    fn from(obs: FiniteState) -> Self {
+        Self::Index(obs.index.into())
+    }
+}
+
+/// An environment that can be made from an id and arguments.
+pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
+    /// One line for `list`.
+    const SUMMARY: &'static str;
+
+    /// The constructor's arguments.
+    const KWARGS: &'static [KwargSpec];
+
+    /// The reset options it knows.
+    const RESET_OPTIONS: &'static [&'static str] = &[];
+
+    /// The attributes that may be set before the first reset.
+    const ATTRIBUTES: &'static [&'static str] = &[];
+
+    /// Builds it from checked arguments.
+    ///
+    /// # Errors
+    /// If a value is out of its range.
+    fn from_kwargs(kwargs: &Kwargs) -> Result<Self, EnvError>;
+
+    /// Starts an episode with Gymnasium's `options`, all of them in [`Self::RESET_OPTIONS`].
+    /// Draws nothing if they are wrong.
+    ///
+    /// # Errors
+    /// If an option's value is not allowed.
+    fn reset_with(
+        &mut self,
+        _options: &Map<String, Value>,
+        rng: &mut NumpyRng,
+    ) -> Result<Self::Obs, EnvError> {
+        Ok(self.reset(rng))
+    }
+
+    /// Sets an attribute, one of [`Self::ATTRIBUTES`].
+    ///
+    /// # Errors
+    /// If the value is not allowed.
+    fn set_attribute(&mut self, _name: &str, _value: &Value) -> Result<(), EnvError> {
+        Ok(())
+    }
+}

@@ -1,0 +1,358 @@
+//! The one place where environments are registered: one entry of `environments!` each.
+//!
+//! `list`, suggestions, editor definitions, conformance tests and documents iterate [`specs`].
+
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
+use super::cart_pole::CartPole;
+use super::error::{EnvError, did_you_mean, list};
+use super::frozen_lake::FrozenLake;
+use super::kwargs::{KwargSpec, Kwargs};
+use super::mountain_car::MountainCar;
+use super::registered::{Observation, Registered};
+use crate::mdp::numpy::NumpyRng;
+use crate::mdp::{Env, FiniteMdp, Schema};
+
+/// An environment's id and what Gymnasium registers with it.
+#[derive(Debug)]
+pub struct EnvSpec {
+    /// The id, for example `CartPole-v1`.
+    pub id: &'static str,
+    /// The time limit, in steps.
+    pub max_steps: Option<u32>,
+    /// The mean return from which it counts as solved.
+    pub reward_threshold: Option<f64>,
+    /// One line for `list`.
+    pub summary: &'static str,
+    /// The reset options it knows.
+    pub reset_options: &'static [&'static str],
+    /// The attributes that may be set before the first reset.
+    pub attributes: &'static [&'static str],
+    declared: &'static [KwargSpec],
+    /// The declared defaults that this id changes: name and JSON.
+    overrides: &'static [(&'static str, &'static str)],
+    build: fn(&Kwargs) -> Result<AnyEnv, EnvError>,
+}
+
+impl EnvSpec {
+    /// The constructor's arguments, with this id's defaults.
+    pub fn kwargs(&self) -> Vec<KwargSpec> {
+        let mut specs = self.declared.to_vec();
+        for spec in &mut specs {
+            if let Some((_, default)) = self.overrides.iter().find(|(name, _)| *name == spec.name) {
+                spec.default = default;
+            }
+        }
+        specs
+    }
+
+    /// The arguments in canonical form: defaults filled in, names sorted, numbers as floats. Two
+    /// maps that mean the same give the same JSON, so a configuration's hash may be taken over it.
+    ///
+    /// # Errors
+    /// On an unknown name or a value of the wrong type.
+    pub fn resolve_kwargs(
+        &self,
+        given: &Map<String, Value>,
+    ) -> Result<Map<String, Value>, EnvError> {
+        Ok(Kwargs::resolve(self.id, &self.kwargs(), given)?.into_map())
+    }
+
+    /// Builds the environment.
+    ///
+    /// # Errors
+    /// As [`Self::resolve_kwargs`], and if a value is out of its range.
+    pub fn make(&self, given: &Map<String, Value>) -> Result<AnyEnv, EnvError> {
+        (self.build)(&Kwargs::resolve(self.id, &self.kwargs(), given)?)
+    }
+}
+
+/// Something to be done with an environment whose type it then knows: the dispatch happens once
+/// per run, and the steps inside are static.
+pub trait EnvVisitor {
+    /// What comes of it.
+    type Out;
+
+    /// Does it.
+    fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out;
+}
+
+/// An environment, seen through a vtable: for sessions, which are dynamic in every step.
+pub(super) trait Dynamic {
+    fn reset(
+        &mut self,
+        options: &Map<String, Value>,
+        rng: &mut NumpyRng,
+    ) -> Result<Observation, EnvError>;
+    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
+    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
+    fn n_actions(&self) -> usize;
+    fn schema(&self) -> Schema;
+    fn finite(&self) -> Option<&Arc<FiniteMdp>>;
+}
+
+/// What [`Dynamic::step`] returns.
+pub(super) struct DynamicStep {
+    pub(super) obs: Observation,
+    pub(super) reward: f64,
+    pub(super) terminated: bool,
+    /// The probability of the outcome, on finite environments.
+    pub(super) probability: Option<f64>,
+}
+
+impl<E: Registered> Dynamic for E {
+    fn reset(
+        &mut self,
+        options: &Map<String, Value>,
+        rng: &mut NumpyRng,
+    ) -> Result<Observation, EnvError> {
+        Ok(self.reset_with(options, rng)?.into())
+    }
+
+    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
+        let step = Env::step(self, action, rng);
+        let probability = Env::finite(self)
+            .zip(self.outcome_index(&step.obs))
+            .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
+        let (reward, terminated) = (step.reward, step.terminated);
+        DynamicStep { obs: step.obs.into(), reward, terminated, probability }
+    }
+
+    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {
+        Registered::set_attribute(self, name, value)
+    }
+
+    fn n_actions(&self) -> usize {
+        Env::n_actions(self)
+    }
+
+    fn schema(&self) -> Schema {
+        Env::schema(self)
+    }
+
+    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
+        Env::finite(self)
+    }
+}
+
+/// Generates [`AnyEnv`] and the list of specs from entries of the form
+/// `Type: ["id", time limit, reward threshold, "kwarg" = "changed default as JSON"...], [...];`
+macro_rules! environments {
+    ($($type:ident:
+        $([$id:literal, $steps:expr, $threshold:expr $(, $key:literal = $default:literal)*]),+;
+    )*) => {
+        /// Any registered environment.
+        #[derive(Debug, Clone)]
+        pub enum AnyEnv {
+            $(
+                #[doc = concat!("See [`", stringify!($type), "`].")]
+                $type($type),
+            )*
+        }
+
+        impl AnyEnv {
+            /// Hands the environment, with its type, to `visitor`.
+            pub fn visit<V: EnvVisitor>(self, visitor: V) -> V::Out {
+                match self {
+                    $(Self::$type(env) => visitor.visit(env),)*
+                }
+            }
+
+            pub(super) fn dynamic(&self) -> &dyn Dynamic {
+                match self {
+                    $(Self::$type(env) => env,)*
+                }
+            }
+
+            pub(super) fn dynamic_mut(&mut self) -> &mut dyn Dynamic {
+                match self {
+                    $(Self::$type(env) => env,)*
+                }
+            }
+        }
+
+        static SPECS: &[EnvSpec] = &[
+            $($(EnvSpec {
+                id: $id,
+                max_steps: $steps,
+                reward_threshold: $threshold,
+                summary: <$type as Registered>::SUMMARY,
+                reset_options: <$type as Registered>::RESET_OPTIONS,
+                attributes: <$type as Registered>::ATTRIBUTES,
+                declared: <$type as Registered>::KWARGS,
+                overrides: &[$(($key, $default)),*],
+                build: |kwargs| Ok(AnyEnv::$type(<$type as Registered>::from_kwargs(kwargs)?)),
+            },)+)*
+        ];
+    };
+}
+
+environments! {
+    CartPole: ["CartPole-v0", Some(200), Some(195.0)], ["CartPole-v1", Some(500), Some(475.0)];
+    MountainCar: ["MountainCar-v0", Some(200), Some(-110.0)];
+    FrozenLake: ["FrozenLake-v1", Some(100), Some(0.7)],
+        ["FrozenLake8x8-v1", Some(200), Some(0.85), "map_name" = "\"8x8\""];
+}
+
+impl AnyEnv {
+    /// Number of discrete actions.
+    pub fn n_actions(&self) -> usize {
+        self.dynamic().n_actions()
+    }
+
+    /// How scripts name its states.
+    pub fn schema(&self) -> Schema {
+        self.dynamic().schema()
+    }
+
+    /// Its model, if it has a finite one.
+    pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
+        self.dynamic().finite()
+    }
+}
+
+/// Every registered environment.
+pub fn specs() -> &'static [EnvSpec] {
+    SPECS
+}
+
+/// Looks up an id; one without a version means the newest.
+///
+/// # Errors
+/// If there is no such environment: with its successor if the version is an old one, else with
+/// the most similar id.
+pub fn find(id: &str) -> Result<&'static EnvSpec, EnvError> {
+    find_with_note(id).map(|(spec, _)| spec)
+}
+
+/// As [`find`], with a note for the user if the id was not a full one.
+///
+/// # Errors
+/// As [`find`].
+pub fn find_with_note(id: &str) -> Result<(&'static EnvSpec, Option<String>), EnvError> {
+    if let Some(spec) = SPECS.iter().find(|spec| spec.id == id) {
+        return Ok((spec, None));
+    }
+    let (name, version) = split(id);
+    let mut family: Vec<_> = SPECS.iter().filter(|spec| split(spec.id).0 == name).collect();
+    family.sort_by_key(|spec| split(spec.id).1);
+    let Some(newest) = family.last() else {
+        return Err(unknown(id));
+    };
+    let Some(version) = version else {
+        let note = format!("`{id}` has no version: using the newest, `{}`", newest.id);
+        return Ok((newest, Some(note)));
+    };
+    let hint = format!("use `{}`", newest.id);
+    if Some(version) < split(newest.id).1 {
+        let message = format!("version v{version} of the environment `{name}` is out of date");
+        return Err(EnvError::new(message).hint(hint));
+    }
+    let versions: Vec<_> = family.iter().map(|spec| spec.id).collect();
+    let message = format!("there is no `{id}`; there is {}", list(&versions));
+    Err(EnvError::new(message).hint(hint))
+}
+
+/// Builds the environment `id` with the arguments `kwargs`.
+///
+/// # Errors
+/// As [`find`] and [`EnvSpec::make`].
+pub fn make(id: &str, kwargs: &Map<String, Value>) -> Result<AnyEnv, EnvError> {
+    find(id)?.make(kwargs)
+}
+
+/// An id's name and version.
+fn split(id: &str) -> (&str, Option<u32>) {
+    match id.rsplit_once("-v") {
+        Some((name, version)) => match version.parse() {
+            Ok(version) => (name, Some(version)),
+            Err(_) => (id, None),
+        },
+        None => (id, None),
+    }
+}
+
+fn unknown(id: &str) -> EnvError {
+    let error = EnvError::new(format!("there is no environment `{id}`"));
+    let ids: Vec<_> = SPECS.iter().map(|spec| spec.id).collect();
+    // Names are compared without versions: `cartpol` is nearer to CartPole than to nothing.
+    let name = did_you_mean(split(id).0, ids.iter().map(|id| split(id).0));
+    match name.and_then(|name| find(name).ok()) {
+        Some(spec) => error.hint(format!("did you mean `{}`?", spec.id)),
+        None => error.hint(format!("there is {}", list(&ids))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn kwargs(value: &Value) -> Map<String, Value> {
+        value.as_object().unwrap().clone()
+    }
+
+    #[test]
+    fn ids_resolve_or_say_what_to_use() {
+        assert_eq!(find("CartPole-v0").unwrap().id, "CartPole-v0");
+        let (spec, note) = find_with_note("CartPole").unwrap();
+        assert_eq!(spec.id, "CartPole-v1");
+        assert_eq!(
+            note.as_deref(),
+            Some("`CartPole` has no version: using the newest, `CartPole-v1`")
+        );
+        for (id, message) in [
+            (
+                "FrozenLake-v0",
+                "version v0 of the environment `FrozenLake` is out of date (use `FrozenLake-v1`)",
+            ),
+            (
+                "CartPole-v2",
+                "there is no `CartPole-v2`; there is `CartPole-v0`, `CartPole-v1` \
+                 (use `CartPole-v1`)",
+            ),
+            ("cartpole-v1", "there is no environment `cartpole-v1` (did you mean `CartPole-v1`?)"),
+            ("MontainCar", "there is no environment `MontainCar` (did you mean `MountainCar-v0`?)"),
+        ] {
+            assert_eq!(find(id).unwrap_err().to_string(), message);
+        }
+        let hint = find("Chess-v1").unwrap_err().hint.unwrap();
+        assert!(hint.starts_with("there is `CartPole-v0`, `CartPole-v1`, "), "{hint}");
+    }
+
+    #[test]
+    fn an_id_may_change_a_default() {
+        let resolve = |id: &str| find(id).unwrap().resolve_kwargs(&Map::new()).unwrap();
+        assert_eq!(resolve("FrozenLake-v1")["map_name"], "4x4");
+        assert_eq!(resolve("FrozenLake8x8-v1")["map_name"], "8x8");
+        let states = |id| make(id, &Map::new()).unwrap().finite().unwrap().n_states();
+        assert_eq!((states("FrozenLake-v1"), states("FrozenLake8x8-v1")), (16, 64));
+    }
+
+    #[test]
+    fn wrong_arguments_name_the_key() {
+        let make = |id, given| make(id, &kwargs(&given)).unwrap_err();
+        let error = make("FrozenLake-v1", json!({"slippery": true}));
+        assert_eq!(error.key.as_deref(), Some("slippery"));
+        assert_eq!(error.hint.as_deref(), Some("did you mean `is_slippery`?"));
+        let error = make("FrozenLake-v1", json!({"map_name": null}));
+        assert_eq!(error.key.as_deref(), Some("map_name"));
+        let error = make("FrozenLake-v1", json!({"success_rate": 1.5}));
+        assert_eq!(error.message, "`success_rate` must be between 0 and 1, not 1.5");
+        let error = make("MountainCar-v0", json!({"goal_velocity": "fast"}));
+        assert_eq!(error.message, "`goal_velocity` must be a finite number, not \"fast\"");
+    }
+
+    #[test]
+    fn every_default_is_valid_and_canonical() {
+        for spec in specs() {
+            let resolved = spec.resolve_kwargs(&Map::new()).unwrap();
+            assert_eq!(spec.resolve_kwargs(&resolved).unwrap(), resolved, "{}", spec.id);
+            spec.make(&resolved).unwrap();
+            assert!(spec.overrides.iter().all(|(name, _)| resolved.contains_key(*name)));
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! A rollout as JSON lines: what was played and what came of it.
+//!
+//! ```text
+//! {"type":"reset","seed":0,"obs":[0.013696169,-0.02302133,-0.045902647,-0.048347235]}
+//! {"type":"step","action":1,"obs":[…],"reward":1.0,"terminated":false,"truncated":false}
+//! ```
+//!
+//! After an episode has ended, the next action starts another one with an unseeded reset, whose
+//! line has `"seed":null`.
+
+use std::fmt;
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use super::error::EnvError;
+use super::registered::Observation;
+use super::session::{Session, SessionStep};
+use crate::mdp::numpy::Seed;
+
+/// Why a rollout stopped early.
+#[derive(Debug)]
+pub enum RolloutError {
+    /// The environment refused a reset or an action.
+    Env(EnvError),
+    /// A line could not be written.
+    Io(io::Error),
+}
+
+impl fmt::Display for RolloutError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Env(error) => error.fmt(f),
+            Self::Io(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for RolloutError {}
+
+impl From<EnvError> for RolloutError {
+    fn from(error: EnvError) -> Self {
+        Self::Env(error)
+    }
+}
+
+impl From<io::Error> for RolloutError {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+#[derive(Serialize)]
+struct StepLine<'a> {
+    r#type: &'static str,
+    action: i64,
+    #[serde(flatten)]
+    step: &'a SessionStep,
+}
+
+/// Plays `steps` actions chosen by `policy` from a reset with `seed`, writing one JSON line per
+/// reset and step to `out`. The session may have been used before.
+///
+/// # Errors
+/// If the environment refuses an action (the message says which one) or `out` a line. What was
+/// played before is written.
+pub fn rollout(
+    session: &mut Session,
+    seed: &Seed,
+    steps: usize,
+    mut policy: impl FnMut(&Observation) -> i64,
+    out: &mut dyn Write,
+) -> Result<(), RolloutError> {
+    let mut obs = session.reset(Some(seed), None)?;
+    write_reset(out, Some(seed), &obs)?;
+    let mut ended = false;
+    for i in 0..steps {
+        if ended {
+            obs = session.reset(None, None)?;
+            write_reset(out, None, &obs)?;
+        }
+        let action = policy(&obs);
+        let step = session.step(action).map_err(|mut error| {
+            error.message = format!("at step {i}: {}", error.message);
+            error
+        })?;
+        serde_json::to_writer(&mut *out, &StepLine { r#type: "step", action, step: &step })
+            .map_err(io::Error::from)?;
+        out.write_all(b"\n")?;
+        ended = step.terminated || step.truncated;
+        obs = step.obs;
+    }
+    Ok(())
+}
+
+/// Plays a list of actions: [`rollout`] with as many steps.
+///
+/// # Errors
+/// As [`rollout`].
+pub fn rollout_actions(
+    session: &mut Session,
+    seed: &Seed,
+    actions: &[i64],
+    out: &mut dyn Write,
+) -> Result<(), RolloutError> {
+    let mut next = actions.iter().copied();
+    // There are exactly as many calls as actions.
+    rollout(session, seed, actions.len(), |_| next.next().unwrap_or(-1), out)
+}
+
+/// Reads `0,1,1`: integers separated by commas, with blanks allowed. An empty text is an empty
+/// list.
+///
+/// # Errors
+/// If a part is no integer.
+pub fn parse_actions(text: &str) -> Result<Vec<i64>, EnvError> {
+    if text.trim().is_empty() {
+        return Ok(Vec::new());
+    }
+    text.split(',')
+        .enumerate()
+        .map(|(i, part)| {
+            part.trim().parse().map_err(|_| {
+                let message = format!(
+                    "actions are integers separated by commas, but number {} is `{}`",
+                    i + 1,
+                    part.trim()
+                );
+                EnvError::about("actions", message)
+            })
+        })
+        .collect()
+}
+
+fn write_reset(out: &mut dyn Write, seed: Option<&Seed>, obs: &Observation) -> io::Result<()> {
+    // A seed may be too large for any integer type: it is written as the digits it displays.
+    let seed = seed.map_or_else(|| "null".to_owned(), Seed::to_string);
+    let obs = serde_json::to_string(obs)?;
+    writeln!(out, r#"{{"type":"reset","seed":{seed},"obs":{obs}}}"#)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Map, json};
+
+    use super::*;
+
+    fn play(id: &str, kwargs: &serde_json::Value, seed: &str, actions: &str) -> String {
+        let mut session = Session::new(id, kwargs.as_object().unwrap()).unwrap();
+        let mut out = Vec::new();
+        let actions = parse_actions(actions).unwrap();
+        rollout_actions(&mut session, &seed.parse().unwrap(), &actions, &mut out).unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn lines_by_hand() {
+        let kwargs = json!({"desc": ["SFG"], "is_slippery": false});
+        assert_eq!(
+            play("FrozenLake-v1", &kwargs, "1208925819614629174706175", "2, 2,2"),
+            r#"{"type":"reset","seed":1208925819614629174706175,"obs":0}
+{"type":"step","action":2,"obs":1,"reward":0.0,"terminated":false,"truncated":false}
+{"type":"step","action":2,"obs":2,"reward":1.0,"terminated":true,"truncated":false}
+{"type":"reset","seed":null,"obs":0}
+{"type":"step","action":2,"obs":1,"reward":0.0,"terminated":false,"truncated":false}
+"#
+        );
+    }
+
+    #[test]
+    fn float32_lines_as_gymnasium_prints_them() {
+        assert_eq!(
+            play("CartPole-v1", &json!({}), "0", "0"),
+            r#"{"type":"reset","seed":0,"obs":[0.013696169,-0.02302133,-0.045902647,-0.048347235]}
+{"type":"step","action":0,"obs":[0.013235742,-0.21745604,-0.04686959,0.22950698],"reward":1.0,"terminated":false,"truncated":false}
+"#
+        );
+    }
+
+    #[test]
+    fn no_reset_follows_the_last_action() {
+        let kwargs = json!({"desc": ["SG"], "is_slippery": false});
+        assert_eq!(play("FrozenLake-v1", &kwargs, "0", "2").lines().count(), 2);
+        assert_eq!(play("FrozenLake-v1", &kwargs, "0", "").lines().count(), 1);
+    }
+
+    #[test]
+    fn mistakes_are_located() {
+        let mut session = Session::new("CartPole-v1", &Map::new()).unwrap();
+        let mut out = Vec::new();
+        let error = rollout_actions(&mut session, &Seed::from(0), &[0, 7], &mut out).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "at step 1: CartPole-v1 has no action 7: its actions are 0 (left), 1 (right)"
+        );
+        assert_eq!(String::from_utf8(out).unwrap().lines().count(), 2);
+        assert_eq!(
+            parse_actions("0,x,1").unwrap_err().message,
+            "actions are integers separated by commas, but number 2 is `x`"
+        );
+    }
+}

@@ -1,0 +1,204 @@
+//! Puts together what a variant describes: discretiser, potential, reward, agent.
+
+use crate::learn::AnyAgent;
+use crate::learn::planning::PlannedAgent;
+use crate::learn::registry::Build;
+use crate::mdp::streams::Stream;
+use crate::mdp::{Env, FiniteMdp, Schema};
+use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+use crate::shaping::{
+    AnyPotential, AnyReward, Bins, CellPotential, Fault, MAX_FIELDS, NativeReward, NoPotential,
+    Potential, RawPotential, RewardModel, ScriptedReward, TabulatedReward, Transition,
+    shaped_model,
+};
+
+/// A representative for each cell: what Φ of a cell is evaluated on.
+pub(super) enum Representative {
+    /// The states themselves.
+    States,
+    /// Bin centres.
+    Centres(Bins),
+}
+
+/// A state with every field in the middle of its range (0 where that is unbounded): the values of
+/// fields that are not binned.
+fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
+    let mut fields = [0.0; MAX_FIELDS];
+    for (x, f) in fields.iter_mut().zip(&schema.fields) {
+        let middle = f64::midpoint(f.low, f.high);
+        *x = if f.low.is_finite() && f.high.is_finite() { middle } else { 0.0 };
+    }
+    fields
+}
+
+/// How a variant's potential is evaluated.
+pub(super) fn potential<E: Env + Clone + 'static>(
+    host: &Host,
+    variant: &Variant,
+    env: &E,
+    n_cells: usize,
+) -> Result<AnyPotential, Fault> {
+    let Some(callback) = &variant.potential else { return Ok(AnyPotential::No(NoPotential)) };
+    let schema = env.schema();
+    let n_fields = schema.fields.len();
+    let mut phi = host.callbacks().potential(callback, &schema);
+    let representative = match (&variant.discretiser, variant.potential_on) {
+        (DiscretiserSpec::StateIndex, _) => Representative::States,
+        (DiscretiserSpec::Bins(dims), PhiOn::Cell) => Representative::Centres(
+            Bins::new(dims).expect("the plan's bins were checked when it was resolved"),
+        ),
+        _ => return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi))),
+    };
+    let potential = match representative {
+        Representative::States => {
+            let states = env.clone();
+            let mut at = move |index: usize| {
+                let mut fields = [0.0; MAX_FIELDS];
+                let obs = states.state(index).expect("only finite environments index their states");
+                states.fields(&obs, &mut fields);
+                phi(&fields[..n_fields])
+            };
+            // Reachable states at once, so that a mistake shows before training; the others, which
+            // may be junk, never.
+            let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
+            let mut table = vec![f64::NAN; n_cells];
+            for (index, _) in reachable.iter().enumerate().filter(|(_, r)| **r) {
+                table[index] = at(index)?;
+            }
+            CellPotential::partial(table, Box::new(at))
+        }
+        Representative::Centres(bins) => {
+            let base = middle(&schema);
+            CellPotential::new(
+                n_cells,
+                Box::new(move |cell| {
+                    let mut fields = base;
+                    bins.centre(cell, &mut fields);
+                    phi(&fields[..n_fields])
+                }),
+            )
+        }
+    };
+    Ok(AnyPotential::Cell(potential))
+}
+
+/// A variant's reward model. On finite environments it is tabulated, unless it reads `t.step`.
+pub(super) fn reward<E: Env + Clone + 'static>(
+    host: &Host,
+    variant: &Variant,
+    env: &E,
+) -> Result<AnyReward<E>, Fault> {
+    if variant.reward.is_none() && variant.terms.is_empty() {
+        return Ok(AnyReward::Native(NativeReward));
+    }
+    let schema = env.schema();
+    let terms: Vec<Callback> = variant.terms.values().cloned().collect();
+    let callbacks = host.callbacks();
+    let mut scripted =
+        ScriptedReward::<E>(callbacks.reward(variant.reward.as_ref(), &terms, &schema));
+    if let Some(mdp) = env.finite() {
+        callbacks.clear_step_read();
+        let table = tabulate(env, mdp, terms.len(), &mut scripted)?;
+        if !callbacks.step_read() {
+            return Ok(AnyReward::Tabulated(table));
+        }
+    }
+    Ok(AnyReward::Scripted(scripted))
+}
+
+fn tabulate<E: Env>(
+    env: &E,
+    mdp: &FiniteMdp,
+    n_terms: usize,
+    scripted: &mut ScriptedReward<E>,
+) -> Result<TabulatedReward, Fault> {
+    let reachable = mdp.reachable();
+    TabulatedReward::new(mdp, n_terms, |s, action, i, truncated, terms| {
+        if !reachable[s] {
+            return Ok(0.0);
+        }
+        let outcome = mdp.outcomes()[i];
+        let at = |index: usize| env.state(index).expect("a finite environment");
+        let t = Transition {
+            state: &at(s),
+            action,
+            reward: outcome.reward,
+            next_state: &at(outcome.next_state as usize),
+            terminated: outcome.terminated,
+            truncated,
+            step: 0,
+        };
+        scripted.reward(env, &t, terms)
+    })
+}
+
+/// The model that a finite variant's agent learns on.
+pub(super) struct LearnedModel {
+    /// The dynamics with the learned rewards, the potential's included.
+    pub(super) shaped: FiniteMdp,
+    /// Φ per state; 0 where there is none and in states that cannot be reached.
+    pub(super) phi: Vec<f64>,
+}
+
+/// The model that a finite variant's agent learns on.
+///
+/// # Errors
+/// If a callback fails, or the reward depends on more than the transition.
+pub(super) fn learned_model<E: Env + Clone + 'static>(
+    host: &Host,
+    variant: &Variant,
+    env: &E,
+) -> Result<LearnedModel, Fault> {
+    let mdp = env.finite().expect("only asked of finite environments");
+    let reachable = mdp.reachable();
+    let base = match reward(host, variant, env)? {
+        AnyReward::Native(_) => (**mdp).clone(),
+        AnyReward::Tabulated(table) => {
+            let mut outcome = 0;
+            mdp.with_rewards(|_, _, _| {
+                outcome += 1;
+                table.of(outcome - 1)
+            })
+        }
+        AnyReward::Scripted(_) => {
+            let place = variant.reward.as_ref().and_then(|r| r.place.clone());
+            let d =
+                Diagnostic::error("the reward reads `t.step`: it is not a function of the state")
+                    .at(place)
+                    .hint("a model cannot hold it; plan or audit without it");
+            return Err(Fault(Box::new(d)));
+        }
+    };
+    let mut phi = vec![0.0; mdp.n_states()];
+    let mut potential = potential(host, variant, env, mdp.n_states())?;
+    for s in (0..mdp.n_states()).filter(|&s| reachable[s]) {
+        let obs = env.state(s).expect("a finite environment");
+        phi[s] = potential.phi(env, s, &obs)?;
+    }
+    let shaped = shaped_model(&base, variant.agent.float("gamma"), &phi);
+    Ok(LearnedModel { shaped, phi })
+}
+
+/// The variant's agent for one seed, and a planner's largest change per sweep.
+pub(super) fn agent<E: Env + Clone + 'static>(
+    host: &Host,
+    variant: &Variant,
+    env: &E,
+    n_cells: usize,
+    seed: u64,
+) -> Result<(AnyAgent, Vec<f64>), Fault> {
+    match variant.agent.spec.build {
+        Build::Learner(build) => {
+            let stream = Stream::new(seed, "agent");
+            Ok((build(&variant.agent, n_cells, env.n_actions(), stream), Vec::new()))
+        }
+        Build::Planner(build) => {
+            let planner = build(&variant.agent);
+            let model = learned_model(host, variant, env)?;
+            let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
+            let solution = planner.solve(&model.shaped, &v0);
+            let sweeps = solution.changes.clone();
+            Ok((AnyAgent::Planned(PlannedAgent::new(solution, planner.gamma())), sweeps))
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What can be said exactly about a variant's shaping.
+
+use serde::Serialize;
+
+use super::assemble::learned_model;
+use crate::audit::{Preservation, Verdict, preservation};
+use crate::env::EnvVisitor;
+use crate::mdp::Env;
+use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+
+/// The verdict on a variant's shaping.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Audit {
+    /// `unshaped`, `potential-based`, `policy preserved`, `policy changed`, `inconclusive` or
+    /// `not checked`.
+    pub verdict: &'static str,
+    /// Whether the optimal policy survives; `None` if that was not decided.
+    pub policy_preserved: Option<bool>,
+    /// Reachable states whose optimal actions change, where the model is known.
+    pub states_changed: Option<usize>,
+    /// Whether `Q_F + Φ = Q` was found to hold, where the model is known.
+    pub identity_holds: Option<bool>,
+    /// On what the verdict rests, in one line.
+    pub basis: String,
+    /// The comparison itself, where the model is known.
+    #[serde(skip)]
+    pub exact: Option<Preservation>,
+}
+
+impl Audit {
+    fn new(verdict: &'static str, policy_preserved: Option<bool>, basis: &str) -> Self {
+        Self {
+            verdict,
+            policy_preserved,
+            states_changed: None,
+            identity_holds: None,
+            basis: basis.to_string(),
+            exact: None,
+        }
+    }
+
+    /// The verdict with the number of changed states, for tables.
+    pub fn label(&self) -> String {
+        match self.states_changed {
+            Some(n) if n > 0 => format!("{} ({n})", self.verdict),
+            _ => self.verdict.to_string(),
+        }
+    }
+}
+
+/// Judges the shaping of `variant`.
+///
+/// On a finite environment both models are solved and compared. Elsewhere a potential evaluated on
+/// cells is potential-based by construction, and other rewards are not judged.
+///
+/// # Errors
+/// If a callback fails.
+pub fn audit_variant(host: &Host, variant: &Variant) -> Result<Audit, Diagnostic> {
+    if variant.potential.is_none() && variant.reward.is_none() && variant.terms.is_empty() {
+        return Ok(Audit::new("unshaped", Some(true), "the agent learns from the native reward"));
+    }
+    let env = variant
+        .env
+        .make(&variant.kwargs)
+        .map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+    env.visit(Judge { host, variant })
+}
+
+struct Judge<'a> {
+    host: &'a Host,
+    variant: &'a Variant,
+}
+
+impl EnvVisitor for Judge<'_> {
+    type Out = Result<Audit, Diagnostic>;
+
+    fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
+        let (host, variant) = (self.host, self.variant);
+        let potential_only = variant.reward.is_none() && variant.terms.is_empty();
+        let DiscretiserSpec::StateIndex = variant.discretiser else {
+            return Ok(match (potential_only, variant.potential_on) {
+                (true, PhiOn::Cell) => Audit::new(
+                    "potential-based",
+                    Some(true),
+                    "by construction, for the discretised problem: Φ is constant on each cell",
+                ),
+                (true, PhiOn::Raw) => {
+                    Audit::new("not checked", None, "Φ of the raw state is not constant on cells")
+                }
+                (false, _) => {
+                    Audit::new("not checked", None, "a scripted reward without a finite model")
+                }
+            });
+        };
+        let model = match learned_model(host, variant, &env) {
+            Ok(model) => model,
+            Err(fault) => {
+                let d = fault.0.downcast::<Diagnostic>();
+                let d = d.map_or_else(|e| Diagnostic::error(e.to_string()), |d| *d);
+                // A reward that reads `t.step` has no model, which is an answer, not a mistake.
+                if d.message.contains("t.step") {
+                    return Ok(Audit::new("not checked", None, "the reward reads `t.step`"));
+                }
+                return Err(d.note(format!("in variant `{}`", variant.name)));
+            }
+        };
+        let plain = env.finite().expect("StateIndex is given to finite environments only");
+        let gamma = variant.agent.float("gamma");
+        let Ok(result) = preservation(plain, &model.shaped, gamma, &model.phi) else {
+            return Ok(Audit::new(
+                "inconclusive",
+                None,
+                "with gamma = 1 some policy never ends and has no value: use gamma < 1",
+            ));
+        };
+        let (verdict, preserved, basis) = match result.verdict {
+            Verdict::Inconclusive => {
+                ("inconclusive", None, "two actions are too close for the numbers to decide")
+            }
+            Verdict::Preserved if potential_only && result.identity_holds() => {
+                ("potential-based", Some(true), "exact: Q_F + Φ = Q and the greedy sets are equal")
+            }
+            Verdict::Preserved => {
+                ("policy preserved", Some(true), "exact: the greedy sets are equal")
+            }
+            Verdict::Changed => ("policy changed", Some(false), "exact: the greedy sets differ"),
+        };
+        Ok(Audit {
+            states_changed: Some(result.states_changed.len()),
+            identity_holds: potential_only.then(|| result.identity_holds()),
+            exact: Some(result),
+            ..Audit::new(verdict, preserved, basis)
+        })
+    }
+}

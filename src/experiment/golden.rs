@@ -1,0 +1,174 @@
+//! A small, reviewable text that pins down what a script learns: per variant the greedy action
+//! sets, returns at a few checkpoints, and on finite environments the exact check.
+
+use std::fmt::Write;
+use std::sync::atomic::AtomicBool;
+
+use sha2::{Digest, Sha256};
+
+use super::audit::{Audit, audit_variant};
+use super::record::UnitRecord;
+use super::unit::{UnitError, run_unit};
+use crate::env::EnvVisitor;
+use crate::learn::{QTable, greedy_sets};
+use crate::mdp::{Env, Grid, Schema};
+use crate::script::{Diagnostic, DiscretiserSpec, Host, Plan, SeedList, Variant};
+use crate::shaping::Dim;
+use crate::stats::rolling_mean;
+
+/// What a golden run plays at most, unless the script says otherwise.
+const EPISODES: u32 = 200;
+const SEEDS: u32 = 2;
+/// Checkpoints of the learning curve.
+const CHECKPOINTS: [u32; 4] = [25, 50, 75, 100];
+
+/// Runs `plan` within its golden budget and describes what was learned.
+///
+/// # Errors
+/// If a callback fails.
+pub fn text(plan: &Plan) -> Result<String, Diagnostic> {
+    let host = Host::open(plan)?;
+    let mut out = format!("study {}\n", plan.name);
+    for variant in &plan.variants {
+        let episodes = plan.golden.episodes.unwrap_or(EPISODES).min(variant.episodes);
+        let n_seeds = plan.golden.seeds.unwrap_or(SEEDS).min(variant.seeds.0.len() as u32);
+        let seeds = SeedList(variant.seeds.0[..n_seeds as usize].to_vec());
+        let variant = Variant { episodes, seeds, ..variant.clone() };
+        describe(&host, &variant, &mut out)?;
+    }
+    Ok(out)
+}
+
+const MEMORY: &str = "writing to a string does not fail";
+
+fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diagnostic> {
+    let params: Vec<String> =
+        variant.agent.params.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+    writeln!(out, "\nvariant {}", variant.name).expect(MEMORY);
+    writeln!(out, "  env {} {}", variant.env.id, serde_json::Value::Object(variant.kwargs.clone()))
+        .expect(MEMORY);
+    writeln!(out, "  agent {}({})", variant.agent.spec.name, params.join(", ")).expect(MEMORY);
+    let audit = audit_variant(host, variant)?;
+    exact(&audit, out);
+    let look = look(variant)?;
+    for (i, &seed) in variant.seeds.0.iter().enumerate() {
+        let record = match run_unit(host, variant, seed, &AtomicBool::new(false), &mut |_| {}) {
+            Ok(record) => record,
+            Err(UnitError::Script(d)) => return Err(*d),
+            Err(UnitError::Interrupted) => unreachable!("nothing raises the flag"),
+        };
+        writeln!(out, "  seed {seed}").expect(MEMORY);
+        returns(variant, &record, out);
+        if let Some(q) = &record.q {
+            let sets = greedy_sets(q);
+            writeln!(out, "    greedy sets {} of {} states", digest(&sets), sets.len())
+                .expect(MEMORY);
+            if let Some(grid) = &look.schema.grid {
+                draw_grid(grid, &sets, out);
+            } else if let (0, DiscretiserSpec::Bins(dims)) = (i, &variant.discretiser) {
+                draw_bins(dims, &look.schema, q, &sets, out);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn exact(audit: &Audit, out: &mut String) {
+    writeln!(out, "  shaping {}: {}", audit.label(), audit.basis).expect(MEMORY);
+    if let Some(exact) = &audit.exact {
+        let holds = if exact.identity_holds() { "holds" } else { "does not hold" };
+        writeln!(
+            out,
+            "  exact check: Q_F + Φ = Q {holds}; {}",
+            match exact.states_changed.as_slice() {
+                [] => "the greedy sets are equal in every reachable state".to_string(),
+                states => format!("the greedy sets differ in states {states:?}"),
+            }
+        )
+        .expect(MEMORY);
+    }
+}
+
+fn returns(variant: &Variant, record: &UnitRecord, out: &mut String) {
+    let native: Vec<f64> = record.rows.iter().map(|r| r.native).collect();
+    let rolling = rolling_mean(&native, variant.window as usize);
+    let points = CHECKPOINTS.map(|percent| {
+        let episode = (rolling.len() * percent as usize / 100).max(1);
+        format!("{:.4} after {episode}", rolling[episode - 1])
+    });
+    writeln!(out, "    return {}", points.join(", ")).expect(MEMORY);
+    writeln!(out, "    steps {}", record.steps()).expect(MEMORY);
+}
+
+/// Pins every set without listing them all.
+fn digest(sets: &[Vec<usize>]) -> String {
+    let hash = Sha256::digest(format!("{sets:?}").as_bytes());
+    hash.iter().take(8).map(|b| format!("{b:02x}")).collect()
+}
+
+/// What is needed of the environment to draw.
+struct Look {
+    schema: Schema,
+}
+
+fn look(variant: &Variant) -> Result<Look, Diagnostic> {
+    struct Ask;
+    impl EnvVisitor for Ask {
+        type Out = Schema;
+        fn visit<E: Env + Clone + 'static>(self, env: E) -> Schema {
+            env.schema()
+        }
+    }
+    let env = variant
+        .env
+        .make(&variant.kwargs)
+        .map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+    Ok(Look { schema: env.visit(Ask) })
+}
+
+/// The map: each cell its tile and the arrows of its greedy set.
+fn draw_grid(grid: &Grid, sets: &[Vec<usize>], out: &mut String) {
+    let cols = grid.rows.first().map_or(0, |r| r.chars().count());
+    for (r, row) in grid.rows.iter().enumerate() {
+        let cells = row.chars().enumerate().map(|(c, tile)| {
+            let set = &sets[r * cols + c];
+            let arrows: String = if matches!(tile, 'H' | 'G') {
+                String::new()
+            } else {
+                set.iter().map(|&a| grid.arrows[a]).collect()
+            };
+            format!("{tile}{arrows:<width$}", width = grid.arrows.len())
+        });
+        writeln!(out, "    {}", cells.collect::<Vec<_>>().join(" ").trim_end()).expect(MEMORY);
+    }
+}
+
+/// The last two binned fields as a map, the others in their middle bins; a digit where one action
+/// is greedy, `*` where several are, `.` where nothing was learned.
+fn draw_bins(dims: &[Dim], schema: &Schema, q: &QTable, sets: &[Vec<usize>], out: &mut String) {
+    let (rows, cols) = match dims {
+        [.., a, b] => (Some(a), b),
+        [b] => (None, b),
+        [] => return,
+    };
+    let fixed = &dims[..dims.len().saturating_sub(2)];
+    let base = fixed.iter().fold(0, |cell, d| cell * d.n + d.n / 2);
+    let name = |d: &Dim| schema.fields[d.field].name;
+    let down = rows.map_or(String::new(), |d| format!(" (down) against {}", name(d)));
+    writeln!(out, "    greedy action by {}{down}:", name(cols)).expect(MEMORY);
+    let n_rows = rows.map_or(1, |d| d.n);
+    for r in 0..n_rows {
+        let line: String = (0..cols.n)
+            .map(|c| {
+                let cell = (base * n_rows + r) * cols.n + c;
+                let row = q.row(cell);
+                match sets[cell].as_slice() {
+                    _ if row.iter().all(|v| *v == row[0]) => '.',
+                    [a] => char::from_digit(*a as u32, 36).unwrap_or('?'),
+                    _ => '*',
+                }
+            })
+            .collect();
+        writeln!(out, "    {line}").expect(MEMORY);
+    }
+}

@@ -1,0 +1,27 @@
+//! From a plan to results: units, threads, the unit store, resuming, golden files.
+//!
+//! - [`train`]: the training loop, the same for every environment, agent and shaping
+//! - [`run_unit`]: one variant under one seed
+//! - [`execute`]: all units of a plan on threads, skipping those already stored
+//! - [`Store`]: one immutable folder per unit, committed by an atomic rename
+//! - [`check`]: calls every callback on sampled states before anything is run
+//! - [`audit_variant`]: what can be said exactly about a variant's shaping
+//! - [`golden`]: a small text that pins down what a script learns
+
+mod assemble;
+mod audit;
+mod check;
+mod execute;
+pub mod golden;
+mod record;
+mod store;
+mod train;
+mod unit;
+
+pub use audit::{Audit, audit_variant};
+pub use check::check;
+pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
+pub use record::{EpisodeRow, UnitRecord};
+pub use store::{Store, StoreError, StoredUnit, write_atomically, write_atomically_with};
+pub use train::{Interrupted, Limits, TrainError, World, train};
+pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};

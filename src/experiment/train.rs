@@ -1,0 +1,174 @@
+//! The training loop.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::record::EpisodeRow;
+use crate::learn::{Agent, Last};
+use crate::mdp::numpy::NumpyRng;
+use crate::mdp::{Ending, Env};
+use crate::shaping::{Discretiser, Fault, Potential, RewardModel, Transition, potential_term};
+
+/// Everything an agent meets, seen through a discretiser and a reward model.
+pub struct World<E, D, P, R> {
+    /// The environment.
+    pub env: E,
+    /// Observation → cell.
+    pub discretiser: D,
+    /// Φ.
+    pub potential: P,
+    /// The learned reward before shaping.
+    pub reward: R,
+}
+
+/// How much is played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Number of episodes.
+    pub episodes: u32,
+    /// Steps after which an episode is truncated.
+    pub max_steps: Option<u32>,
+    /// Number of extra reward terms.
+    pub n_terms: usize,
+}
+
+/// The run was asked to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Interrupted;
+
+/// Why training ended early.
+#[derive(Debug)]
+pub enum TrainError {
+    /// A callback failed, in this episode and step (both from 0).
+    Fault {
+        /// What happened.
+        fault: Fault,
+        /// Episode.
+        episode: u32,
+        /// Step of the episode.
+        step: u32,
+    },
+    /// The run was asked to stop.
+    Interrupted,
+}
+
+/// Steps between looks at the stop flag in an endless episode.
+const STOP_INTERVAL: u32 = 1 << 16;
+
+/// Plays `limits.episodes` episodes, teaching `agent`; calls `each` after every one.
+///
+/// The reward learned from is `reward(t) + γΦ(s′) − Φ(s)`, with Φ(s′) = 0 on termination. On
+/// truncation Φ(s′) is kept if and only if the agent bootstraps from s′: both sides must speak of
+/// the same continuation, or the fixed point moves.
+///
+/// # Errors
+/// If a callback fails, or `stop` is raised.
+pub fn train<E, D, P, R, A>(
+    world: &mut World<E, D, P, R>,
+    agent: &mut A,
+    limits: Limits,
+    rng: &mut NumpyRng,
+    stop: &AtomicBool,
+    mut each: impl FnMut(EpisodeRow),
+) -> Result<(), TrainError>
+where
+    E: Env,
+    D: Discretiser<E>,
+    P: Potential<E>,
+    R: RewardModel<E>,
+    A: Agent,
+{
+    for episode in 0..limits.episodes {
+        if stop.load(Ordering::Relaxed) {
+            return Err(TrainError::Interrupted);
+        }
+        match play(world, agent, limits, rng, stop) {
+            Ok(row) => each(row),
+            Err((None, _)) => return Err(TrainError::Interrupted),
+            Err((Some(fault), step)) => return Err(TrainError::Fault { fault, episode, step }),
+        }
+    }
+    Ok(())
+}
+
+/// One episode. The error is a fault (or `None` for an interruption) and its step.
+#[inline]
+fn play<E, D, P, R, A>(
+    world: &mut World<E, D, P, R>,
+    agent: &mut A,
+    limits: Limits,
+    rng: &mut NumpyRng,
+    stop: &AtomicBool,
+) -> Result<EpisodeRow, (Option<Fault>, u32)>
+where
+    E: Env,
+    D: Discretiser<E>,
+    P: Potential<E>,
+    R: RewardModel<E>,
+    A: Agent,
+{
+    let World { env, discretiser, potential, reward } = world;
+    let max_steps = limits.max_steps.unwrap_or(u32::MAX);
+    let gamma = agent.gamma();
+    let keep_truncated = agent.bootstraps_when_truncated();
+    let epsilon = agent.epsilon();
+    let mut terms = vec![0.0; limits.n_terms];
+    let (mut native, mut learned, mut shaping) = (0.0, 0.0, 0.0);
+
+    let mut obs = env.reset(rng);
+    let cell = discretiser.cell(env, &obs).map_err(|f| (Some(f), 0))?;
+    let mut phi = potential.phi(env, cell, &obs).map_err(|f| (Some(f), 0))?;
+    let mut action = agent.begin(cell);
+    let mut step = 0u32;
+    loop {
+        let failed = |f| (Some(f), step);
+        let s = env.step(action, rng);
+        let truncated = !s.terminated && step + 1 >= max_steps;
+        let next = discretiser.cell(env, &s.obs).map_err(failed)?;
+        let t = Transition {
+            state: &obs,
+            action,
+            reward: s.reward,
+            next_state: &s.obs,
+            terminated: s.terminated,
+            truncated,
+            step,
+        };
+        let mut r = reward.reward(env, &t, &mut terms).map_err(failed)?;
+        if P::ACTIVE {
+            let phi_next = if s.terminated || (truncated && !keep_truncated) {
+                0.0
+            } else {
+                potential.phi(env, next, &s.obs).map_err(failed)?
+            };
+            let f = potential_term(gamma, phi, phi_next);
+            r += f;
+            shaping += f;
+            phi = phi_next;
+        }
+        native += s.reward;
+        learned += r;
+        step += 1;
+        if s.terminated || truncated {
+            let (last, ending) = if s.terminated {
+                (Last::Terminated, Ending::Terminated)
+            } else {
+                (Last::Truncated(next), Ending::Truncated)
+            };
+            agent.end(r, last);
+            return Ok(EpisodeRow {
+                steps: step,
+                native,
+                learned,
+                shaping,
+                terms,
+                epsilon,
+                ending,
+            });
+        }
+        if step % STOP_INTERVAL == 0 && stop.load(Ordering::Relaxed) {
+            return Err((None, step));
+        }
+        action = agent.step(r, next);
+        obs = s.obs;
+    }
+}

@@ -1,0 +1,30 @@
+//! Agents that learn by playing, and planners that solve a model.
+//!
+//! - [`Agent`]: chooses actions and learns from rewards; [`QLearning`], [`Sarsa`], [`RandomAgent`]
+//! - [`planning`]: value iteration, exact policy evaluation, Q from V on a [`FiniteMdp`]
+//! - [`registry`]: the one place where an agent is registered; [`AgentConfig`] is its configuration
+//! - [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what they are made of
+//!
+//! Agents never log, never see a clock, and know nothing of shaping: they learn from the reward
+//! they are handed.
+//!
+//! [`FiniteMdp`]: crate::mdp::FiniteMdp
+
+mod agent;
+mod greedy;
+pub mod planning;
+mod q_learning;
+mod q_table;
+mod random_agent;
+pub mod registry;
+mod sarsa;
+mod schedule;
+
+pub use agent::{Agent, Last};
+pub use greedy::{Behaviour, argmax_tol, greedy_set, greedy_sets};
+pub use q_learning::{QLearning, q_learning_td_error};
+pub use q_table::QTable;
+pub use random_agent::RandomAgent;
+pub use registry::{AgentConfig, AgentSpec, AnyAgent, ParamValue};
+pub use sarsa::{Sarsa, sarsa_td_error};
+pub use schedule::{Schedule, ScheduleState, Unit};

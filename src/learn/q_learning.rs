@@ -1,0 +1,124 @@
+//! Q-learning (Watkins 1989; Sutton & Barto 2018, section 6.5).
+//!
+//! `Q(S, A) ← Q(S, A) + α [R + γ max_a Q(S′, a) − Q(S, A)]`
+//!
+//! The book's order: choose A from S, observe R and S′, update, and only then choose the next
+//! action, from the updated values.
+
+use super::{Agent, Behaviour, Last, QTable, Schedule, ScheduleState};
+use crate::mdp::Action;
+use crate::mdp::streams::Stream;
+
+/// `R + γ max_a Q(S′, a) − Q(S, A)`; pass 0 as `max_next` where S′ is terminal.
+#[inline]
+pub fn q_learning_td_error(q: f64, reward: f64, gamma: f64, max_next: f64) -> f64 {
+    reward + gamma * max_next - q
+}
+
+/// Tabular Q-learning, ε-greedy.
+#[derive(Debug, Clone)]
+pub struct QLearning {
+    q: QTable,
+    gamma: f64,
+    alpha: ScheduleState,
+    behaviour: Behaviour,
+    s: usize,
+    a: Action,
+}
+
+impl QLearning {
+    /// A learner with the table `q`; exploration draws from `stream`.
+    pub fn new(q: QTable, gamma: f64, alpha: Schedule, epsilon: Schedule, stream: Stream) -> Self {
+        let behaviour = Behaviour::new(epsilon, stream);
+        Self { q, gamma, alpha: ScheduleState::new(alpha), behaviour, s: 0, a: 0 }
+    }
+
+    #[inline]
+    fn update(&mut self, reward: f64, max_next: f64) {
+        let q = self.q.get_mut(self.s, self.a);
+        *q += self.alpha.value() * q_learning_td_error(*q, reward, self.gamma, max_next);
+        self.alpha.step();
+    }
+}
+
+impl Agent for QLearning {
+    #[inline]
+    fn begin(&mut self, s: usize) -> Action {
+        self.s = s;
+        self.a = self.behaviour.choose(self.q.row(s));
+        self.a
+    }
+
+    #[inline]
+    fn step(&mut self, reward: f64, next: usize) -> Action {
+        let max_next = self.q.max(next);
+        self.update(reward, max_next);
+        self.begin(next)
+    }
+
+    fn end(&mut self, reward: f64, last: Last) {
+        let max_next = match last {
+            Last::Terminated => 0.0,
+            Last::Truncated(next) => self.q.max(next),
+        };
+        self.update(reward, max_next);
+        self.alpha.end_episode();
+        self.behaviour.end_episode();
+    }
+
+    fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    fn bootstraps_when_truncated(&self) -> bool {
+        true
+    }
+
+    fn epsilon(&self) -> f64 {
+        self.behaviour.epsilon()
+    }
+
+    fn q(&self) -> Option<&QTable> {
+        Some(&self.q)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn greedy_learner() -> QLearning {
+        let q = QTable::from_values(2, vec![0.0, 1.0, 4.0, 2.0]);
+        let (alpha, epsilon) = (Schedule::constant(0.5), Schedule::constant(0.0));
+        QLearning::new(q, 0.9, alpha, epsilon, Stream::new(0, "test"))
+    }
+
+    #[test]
+    fn a_step_by_hand() {
+        let mut agent = greedy_learner();
+        assert_eq!(agent.begin(0), 1);
+        // 1 + 0.5 (10 + 0.9 * 4 - 1) = 7.3; then greedy in state 1.
+        assert_eq!(agent.step(10.0, 1), 0);
+        assert_eq!(agent.q.get(0, 1), 1.0 + 0.5 * (10.0 + 0.9 * 4.0 - 1.0));
+    }
+
+    #[test]
+    fn the_next_action_is_chosen_after_the_update() {
+        let mut agent = greedy_learner();
+        assert_eq!(agent.begin(1), 0);
+        // Back to state 1: Q(1, 0) falls to 4 + 0.5 (-20 + 3.6 - 4) = -6.2 first.
+        assert_eq!(agent.step(-20.0, 1), 1);
+    }
+
+    #[test]
+    fn termination_cuts_the_target_and_truncation_does_not() {
+        let mut agent = greedy_learner();
+        agent.begin(0);
+        agent.end(2.0, Last::Terminated);
+        assert_eq!(agent.q.get(0, 1), 1.0 + 0.5 * (2.0 - 1.0));
+        let mut agent = greedy_learner();
+        agent.begin(0);
+        agent.end(2.0, Last::Truncated(1));
+        assert_eq!(agent.q.get(0, 1), 1.0 + 0.5 * (2.0 + 0.9 * 4.0 - 1.0));
+    }
+}

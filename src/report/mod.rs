@@ -1,0 +1,17 @@
+//! What a study looks like from outside: summaries, tables and plots of results.
+//!
+//! - [`results`]: the results folder and every file derived from its units
+//! - [`manifest`]: `study.json`
+//! - [`summary`]: per-variant statistics, as in `summary.json`
+//! - [`curves`]: learning curves as SVG
+//! - [`table`]: the closing table in the terminal
+//! - `legend`: the legend of the curves
+//! - `svg`: scales, ticks and escaping for hand-written SVG
+
+pub mod curves;
+mod legend;
+pub mod manifest;
+pub mod results;
+pub mod summary;
+mod svg;
+pub mod table;

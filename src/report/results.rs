@@ -1,0 +1,315 @@
+//! The results folder: what belongs to it, and the files derived from its units.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::curves::{Curve, CurvesPlot, curves_svg};
+use super::manifest::manifest;
+use super::summary::{VariantSummary, summarise};
+use crate::experiment::{
+    Audit, Execution, Store, StoreError, Unit, units, write_atomically, write_atomically_with,
+};
+use crate::script::Plan;
+use crate::stats::curve_band;
+
+/// A study's folder.
+#[derive(Debug)]
+pub struct Results {
+    /// Where it is.
+    pub folder: PathBuf,
+    /// Its units.
+    pub store: Store,
+}
+
+/// Why a folder cannot hold a study's results.
+#[derive(Debug)]
+pub struct FolderError {
+    /// What is in the way.
+    pub message: String,
+    /// What to do.
+    pub hint: Option<String>,
+}
+
+impl From<StoreError> for FolderError {
+    fn from(e: StoreError) -> Self {
+        Self { message: e.to_string(), hint: None }
+    }
+}
+
+/// What was found out about a study.
+#[derive(Debug)]
+pub struct Findings {
+    /// Statistics per variant.
+    pub summaries: Vec<VariantSummary>,
+    /// The verdict on each variant's shaping.
+    pub audits: Vec<Audit>,
+    /// Steps per second and thread, per variant, over all units whose time is known.
+    pub steps_per_second: Vec<Option<f64>>,
+}
+
+impl Results {
+    /// Opens `folder` for `plan`, making it if need be, and writes the manifest and the script
+    /// first, so that what cannot be written is known before anything is run. With `fresh` the
+    /// plan's own units are removed, and nothing else.
+    ///
+    /// # Errors
+    /// If the folder holds something else, or cannot be written.
+    pub fn open(folder: &Path, plan: &Plan, jobs: usize, fresh: bool) -> Result<Self, FolderError> {
+        owned_by(folder, plan)?;
+        std::fs::create_dir_all(folder).map_err(|e| FolderError {
+            message: format!("{}: cannot be made: {e}", folder.display()),
+            hint: Some("choose another place with --out DIR".into()),
+        })?;
+        let write = |name: &str, bytes: &[u8]| write_atomically(&folder.join(name), bytes);
+        let text = serde_json::to_string_pretty(&manifest(plan, jobs)).expect("plain data");
+        write("study.json", format!("{text}\n").as_bytes())?;
+        write("script.rhai", plan.sources.script.text.as_bytes())?;
+        for (path, source) in &plan.sources.imports {
+            let target = folder.join(path);
+            if let Some(parent) = target.parent() {
+                std::fs::create_dir_all(parent).map_err(|e| FolderError {
+                    message: format!("{}: cannot be made: {e}", parent.display()),
+                    hint: None,
+                })?;
+            }
+            write_atomically(&target, source.text.as_bytes())?;
+        }
+        let store = Store::open(folder)?;
+        if fresh {
+            for unit in units(plan) {
+                store.remove(&unit)?;
+            }
+        }
+        Ok(Self { folder: folder.to_path_buf(), store })
+    }
+
+    /// Writes every derived file: `timing.json`, `episodes.csv`, `summary.json`, `summary.csv`,
+    /// `curves.svg`. All but the first depend on the plan alone.
+    ///
+    /// # Errors
+    /// If a unit cannot be read or a file cannot be written.
+    pub fn derive(
+        &self,
+        plan: &Plan,
+        execution: &Execution,
+        audits: Vec<Audit>,
+    ) -> Result<Findings, StoreError> {
+        let steps_per_second = self.timing(plan, execution)?;
+        let mut curves = Vec::new();
+        let mut summaries = Vec::new();
+        let path = self.folder.join("episodes.csv");
+        let mut failed = None;
+        write_atomically_with(&path, |file| {
+            let mut csv = csv::Writer::from_writer(file);
+            let terms = term_names(plan);
+            csv.write_record(episode_header(&terms))?;
+            for (i, variant) in plan.variants.iter().enumerate() {
+                let (mut returns, mut lengths) = (Vec::new(), Vec::new());
+                for unit in execution.units.iter().filter(|u| u.variant == i) {
+                    let stored = match self.store.load(unit) {
+                        Ok(stored) => stored,
+                        Err(e) => {
+                            failed = Some(e);
+                            return Err(std::io::Error::other("a unit cannot be read"));
+                        }
+                    };
+                    for (episode, row) in stored.rows.iter().enumerate() {
+                        csv.write_record(episode_line(plan, unit, episode, row, &terms))?;
+                    }
+                    returns.push(stored.rows.iter().map(|r| r.native).collect::<Vec<f64>>());
+                    lengths.push(stored.rows.iter().map(|r| r.steps).collect::<Vec<u32>>());
+                }
+                let window = variant.window as usize;
+                let (name, threshold) = (&variant.name, variant.threshold);
+                summaries.push(summarise(name, &returns, &lengths, window, threshold));
+                curves.push(Curve { name: name.clone(), band: curve_band(&returns, window) });
+            }
+            csv.flush()
+        })
+        .map_err(|e| failed.take().unwrap_or(e))?;
+        self.summary(plan, &summaries, &audits)?;
+        let first = &plan.variants[0];
+        let shared = plan.variants.iter().all(|v| v.threshold == first.threshold);
+        let plot = CurvesPlot {
+            title: plan.name.clone(),
+            window: first.window as usize,
+            threshold: first.threshold.filter(|_| shared),
+            curves,
+        };
+        write_atomically(&self.folder.join("curves.svg"), curves_svg(&plot).as_bytes())?;
+        Ok(Findings { summaries, audits, steps_per_second })
+    }
+
+    fn summary(
+        &self,
+        plan: &Plan,
+        summaries: &[VariantSummary],
+        audits: &[Audit],
+    ) -> Result<(), StoreError> {
+        let variants: Vec<Value> =
+            summaries.iter().zip(audits).map(|(s, a)| variant_json(s, a)).collect();
+        let text = serde_json::to_string_pretty(&json!({
+            "study": plan.name,
+            "baseline": plan.baseline,
+            "variants": variants,
+        }))
+        .expect("plain data");
+        write_atomically(&self.folder.join("summary.json"), format!("{text}\n").as_bytes())?;
+        let path = self.folder.join("summary.csv");
+        write_atomically_with(&path, |file| {
+            let mut csv = csv::Writer::from_writer(file);
+            csv.write_record(SUMMARY_HEADER)?;
+            for (s, a) in summaries.iter().zip(audits) {
+                csv.write_record(summary_line(s, a))?;
+            }
+            csv.flush()
+        })
+    }
+
+    /// Adds the new units' times to `timing.json`; returns steps per second per variant.
+    fn timing(&self, plan: &Plan, execution: &Execution) -> Result<Vec<Option<f64>>, StoreError> {
+        let path = self.folder.join("timing.json");
+        // Times are a circumstance: a file that cannot be read is begun anew.
+        let old = std::fs::read(&path).ok().and_then(|b| serde_json::from_slice(&b).ok());
+        let mut times: BTreeMap<String, (u64, f64)> = old.unwrap_or_default();
+        for f in &execution.finished {
+            times.insert(f.unit.hash.clone(), (f.steps, f.seconds));
+        }
+        let text = serde_json::to_string_pretty(&times).expect("plain data");
+        write_atomically(&path, format!("{text}\n").as_bytes())?;
+        let rate = |variant| {
+            let own = execution.units.iter().filter(|u| u.variant == variant);
+            let (steps, seconds) = own
+                .filter_map(|u| times.get(&u.hash))
+                .fold((0u64, 0.0), |(steps, seconds), t| (steps + t.0, seconds + t.1));
+            (seconds > 0.0).then(|| steps as f64 / seconds)
+        };
+        Ok((0..plan.variants.len()).map(rate).collect())
+    }
+}
+
+/// A variant's statistics and verdict as one JSON object: what expectations see as `r.<name>`.
+pub fn variant_json(summary: &VariantSummary, audit: &Audit) -> Value {
+    let mut value = serde_json::to_value(summary).expect("plain data");
+    value["audit"] = serde_json::to_value(audit).expect("plain data");
+    value
+}
+
+/// Refuses a folder that holds another study or something else altogether.
+fn owned_by(folder: &Path, plan: &Plan) -> Result<(), FolderError> {
+    let refuse = |message: String| {
+        Err(FolderError {
+            message: format!("{}: {message}", folder.display()),
+            hint: Some("choose another place with --out DIR".into()),
+        })
+    };
+    if folder.exists() && !folder.is_dir() {
+        return refuse("is a file, not a results folder".into());
+    }
+    let manifest = folder.join("study.json");
+    match std::fs::read(&manifest) {
+        Ok(bytes) => match serde_json::from_slice::<Value>(&bytes) {
+            Ok(old) if old["study"] == plan.name.as_str() => Ok(()),
+            Ok(old) => refuse(format!(
+                "holds the results of the study {}, not of \"{}\"",
+                old["study"], plan.name
+            )),
+            Err(e) => refuse(format!("study.json is not a manifest ({e})")),
+        },
+        Err(_) => {
+            let occupied = std::fs::read_dir(folder).is_ok_and(|mut d| {
+                d.any(|entry| {
+                    entry.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with(".tmp-"))
+                })
+            });
+            if occupied { refuse("is not empty and not a results folder".into()) } else { Ok(()) }
+        }
+    }
+}
+
+fn term_names(plan: &Plan) -> Vec<&str> {
+    let mut names: Vec<&str> =
+        plan.variants.iter().flat_map(|v| v.terms.keys().map(String::as_str)).collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+fn episode_header<'a>(terms: &[&'a str]) -> Vec<&'a str> {
+    let mut header =
+        vec!["variant", "seed", "episode", "steps", "return", "learned_return", "shaping"];
+    header.extend(terms);
+    header.extend(["epsilon", "ending"]);
+    header
+}
+
+/// One line of `episodes.csv`; episodes count from 1, a term the variant does not have is empty.
+fn episode_line(
+    plan: &Plan,
+    unit: &Unit,
+    episode: usize,
+    row: &crate::experiment::EpisodeRow,
+    terms: &[&str],
+) -> Vec<String> {
+    let variant = &plan.variants[unit.variant];
+    let float = |x: f64| format!("{x:?}");
+    let mut line = vec![
+        variant.name.clone(),
+        unit.seed.to_string(),
+        (episode + 1).to_string(),
+        row.steps.to_string(),
+        float(row.native),
+        float(row.learned),
+        float(row.shaping),
+    ];
+    for term in terms {
+        let i = variant.terms.keys().position(|name| name == term);
+        line.push(i.and_then(|i| row.terms.get(i)).map_or(String::new(), |x| float(*x)));
+    }
+    line.extend([float(row.epsilon), row.ending.as_str().to_string()]);
+    line
+}
+
+const SUMMARY_HEADER: [&str; 16] = [
+    "variant",
+    "seeds",
+    "episodes",
+    "window",
+    "return_mean",
+    "return_iqm",
+    "return_low",
+    "return_high",
+    "auc_mean",
+    "auc_iqm",
+    "auc_low",
+    "auc_high",
+    "threshold",
+    "solved_seeds",
+    "median_episode_solved",
+    "audit",
+];
+
+fn summary_line(s: &VariantSummary, audit: &Audit) -> Vec<String> {
+    let float = |x: f64| format!("{x:?}");
+    let maybe = |x: Option<f64>| x.map_or(String::new(), float);
+    vec![
+        s.name.clone(),
+        s.seeds.to_string(),
+        s.episodes.to_string(),
+        s.window.to_string(),
+        float(s.final_return.mean),
+        float(s.final_return.iqm),
+        maybe(s.final_return.low),
+        maybe(s.final_return.high),
+        float(s.auc.mean),
+        float(s.auc.iqm),
+        maybe(s.auc.low),
+        maybe(s.auc.high),
+        maybe(s.threshold),
+        s.solved.as_ref().map_or(String::new(), |x| x.seeds.to_string()),
+        maybe(s.solved.as_ref().and_then(|x| x.median_episode)),
+        audit.verdict.to_string(),
+    ]
+}

@@ -1,0 +1,353 @@
+//! The functions with which a script builds its plan.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, Map, NativeCallContext};
+
+use super::diagnostic::{Diagnostic, Place};
+use super::draft::{
+    AgentDraft, BinDraft, DiscretiserDraft, EnvDraft, ExperimentDraft, Located, Spot, StudyDraft,
+    captured_now, is_name,
+};
+use super::engine::Context;
+use super::params::{merge_agent, number, per_step, show, whole};
+use super::plan::GoldenBudget;
+use crate::learn::registry::{AGENTS, AgentSpec};
+use crate::learn::{AgentConfig, Schedule, Unit};
+
+type Fallible<T> = Result<T, Box<EvalAltResult>>;
+
+/// A call in progress: finds the places of the call, its arguments and their keys.
+struct Call<'a> {
+    context: &'a Context,
+    source: Option<String>,
+    position: rhai::Position,
+}
+
+impl<'a> Call<'a> {
+    fn new(context: &'a Context, native: &NativeCallContext) -> Self {
+        Self {
+            context,
+            source: native.call_source().map(str::to_string),
+            position: native.call_position(),
+        }
+    }
+
+    fn place(&self) -> Option<Place> {
+        self.context.place(self.source.as_deref(), self.position)
+    }
+
+    fn spot(&self) -> Spot {
+        Spot(self.place())
+    }
+
+    fn found(
+        &self,
+        find: impl Fn(&super::syntax::Syntax, (usize, usize)) -> Option<(usize, usize)>,
+    ) -> Spot {
+        let place = self.place();
+        let Some(here) = &place else { return Spot(None) };
+        let syntax = self.context.syntax.borrow();
+        let at = syntax.get(&*here.file).and_then(|s| find(s, (here.line, here.column)));
+        Spot(match at {
+            Some((line, column)) => Some(Place { file: here.file.clone(), line, column }),
+            None => place,
+        })
+    }
+
+    /// The place of a (dotted) key in a map literal of this call; else the call's own.
+    fn key(&self, key: &str) -> Spot {
+        self.found(|syntax, call| syntax.keys.get(&call)?.get(key).copied())
+    }
+
+    /// The place of the `i`-th argument; else the call's own.
+    fn arg(&self, i: usize) -> Spot {
+        self.found(|syntax, call| {
+            syntax.args.get(&call)?.get(i).copied().filter(|at| *at != (0, 0))
+        })
+    }
+
+    fn fail<T>(&self, diagnostic: Diagnostic) -> Fallible<T> {
+        let diagnostic = diagnostic.at(self.place());
+        Err(Box::new(EvalAltResult::ErrorRuntime(Dynamic::from(diagnostic), self.position)))
+    }
+
+    fn finish<T>(&self, result: Result<T, Diagnostic>) -> Fallible<T> {
+        result.or_else(|diagnostic| self.fail(diagnostic))
+    }
+}
+
+/// Registers the builders and their types.
+pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
+    engine.register_type_with_name::<ExperimentDraft>("experiment");
+    engine.register_type_with_name::<StudyDraft>("study");
+    engine.register_type_with_name::<AgentDraft>("agent");
+    engine.register_type_with_name::<EnvDraft>("environment");
+    engine.register_type_with_name::<DiscretiserDraft>("discretiser");
+    engine.register_type_with_name::<Schedule>("schedule");
+    experiments(engine, context);
+    studies(engine, context);
+    environments(engine, context);
+    for spec in AGENTS {
+        agent(engine, context, spec);
+    }
+    schedules(engine, context);
+    discretisers(engine, context);
+}
+
+fn experiments(engine: &mut Engine, context: &Rc<Context>) {
+    let c = context.clone();
+    engine.register_fn("experiment", move |native: NativeCallContext, map: Map| {
+        let call = Call::new(&c, &native);
+        let mut draft = ExperimentDraft { spot: call.spot(), ..ExperimentDraft::default() };
+        call.finish(draft.merge(&map, &|key| call.key(key)).map(|()| draft))
+    });
+    let c = context.clone();
+    engine.register_fn(
+        "with",
+        move |native: NativeCallContext, base: &mut ExperimentDraft, map: Map| {
+            let call = Call::new(&c, &native);
+            let mut draft = ExperimentDraft { spot: call.spot(), ..base.clone() };
+            call.finish(draft.merge(&map, &|key| call.key(key)).map(|()| draft))
+        },
+    );
+}
+
+fn studies(engine: &mut Engine, context: &Rc<Context>) {
+    let c = context.clone();
+    engine.register_fn("study", move |native: NativeCallContext, name: &str, list: Array| {
+        let call = Call::new(&c, &native);
+        if !is_name(name) {
+            return call.fail(Diagnostic::error(
+                "a study's name is a string of 1 to 80 characters without / or line breaks",
+            ));
+        }
+        let experiments =
+            call.finish(experiments_of(&list).map_err(|d| d.at(call.arg(1).place())))?;
+        Ok(StudyDraft {
+            name: name.to_string(),
+            spot: call.spot(),
+            experiments,
+            expectations: Vec::new(),
+            baseline: None,
+            notes: None,
+            golden: GoldenBudget::default(),
+        })
+    });
+    let c = context.clone();
+    engine.register_fn(
+        "expect",
+        move |native: NativeCallContext, study: &mut StudyDraft, text: &str, check: FnPtr| {
+            let call = Call::new(&c, &native);
+            let check = Located { value: captured_now(check), spot: call.arg(1) };
+            let mut study = study.clone();
+            study.expectations.push((text.to_string(), check));
+            study
+        },
+    );
+    let c = context.clone();
+    engine.register_fn(
+        "baseline",
+        move |native: NativeCallContext, study: &mut StudyDraft, name: &str| {
+            let call = Call::new(&c, &native);
+            let baseline = Some(Located { value: name.to_string(), spot: call.arg(0) });
+            StudyDraft { baseline, ..study.clone() }
+        },
+    );
+    let c = context.clone();
+    engine.register_fn(
+        "golden",
+        move |native: NativeCallContext, study: &mut StudyDraft, map: Map| {
+            let call = Call::new(&c, &native);
+            let mut golden = GoldenBudget::default();
+            for (key, value) in &map {
+                let n = call.finish(
+                    whole(key, value, 1, 1_000_000).map_err(|d| d.at(call.key(key).place())),
+                )?;
+                match key.as_str() {
+                    "episodes" => golden.episodes = Some(n as u32),
+                    "seeds" => golden.seeds = Some(n as u32),
+                    _ => {
+                        let d = Diagnostic::error(format!("a golden budget has no key `{key}`"));
+                        return call
+                            .fail(d.at(call.key(key).place()).hint("`episodes` or `seeds`"));
+                    }
+                }
+            }
+            Ok(StudyDraft { golden, ..study.clone() })
+        },
+    );
+    engine.register_fn("notes", |study: &mut StudyDraft, text: &str| StudyDraft {
+        notes: Some(text.to_string()),
+        ..study.clone()
+    });
+}
+
+/// The experiments of an array.
+pub(super) fn experiments_of(list: &Array) -> Result<Vec<ExperimentDraft>, Diagnostic> {
+    list.iter()
+        .map(|item| {
+            item.clone().flatten().try_cast::<ExperimentDraft>().ok_or_else(|| {
+                Diagnostic::error(format!("a study is made of experiments, got {}", show(item)))
+            })
+        })
+        .collect()
+}
+
+fn environments(engine: &mut Engine, context: &Rc<Context>) {
+    let new = |id: &str| EnvDraft {
+        id: id.to_string(),
+        kwargs: serde_json::Map::new(),
+        kwarg_spots: BTreeMap::new(),
+    };
+    engine.register_fn("env", move |id: &str| new(id));
+    let c = context.clone();
+    engine.register_fn("env", move |native: NativeCallContext, id: &str, kwargs: Map| {
+        let call = Call::new(&c, &native);
+        let mut draft = new(id);
+        call.finish(draft.merge(&kwargs, |key| call.key(key)).map(|()| draft))
+    });
+}
+
+fn agent(engine: &mut Engine, context: &Rc<Context>, spec: &'static AgentSpec) {
+    let default = move || AgentDraft { spec, params: AgentConfig::new(spec).params };
+    engine.register_fn(spec.name, default);
+    let c = context.clone();
+    engine.register_fn(spec.name, move |native: NativeCallContext, map: Map| {
+        let call = Call::new(&c, &native);
+        let mut draft = default();
+        call.finish(merge_agent(&mut draft, &map, |key| call.key(key)).map(|()| draft))
+    });
+}
+
+fn schedules(engine: &mut Engine, context: &Rc<Context>) {
+    let c = context.clone();
+    engine.register_fn("constant", move |native: NativeCallContext, value: Dynamic| {
+        let call = Call::new(&c, &native);
+        call.finish(finite("the value", &value).map(Schedule::constant))
+    });
+    let unit = |steps: bool| if steps { Unit::Step } else { Unit::Episode };
+    let linear = move |call: &Call<'_>, [start, end, over]: [Dynamic; 3], options: &Map| {
+        call.finish((|| {
+            Ok(Schedule::Linear {
+                start: finite("the start", &start)?,
+                end: finite("the end", &end)?,
+                over: whole("the number of episodes or steps", &over, 1, i64::MAX)? as u64,
+                unit: unit(per_step(options)?),
+            })
+        })())
+    };
+    let exponential = move |call: &Call<'_>, [start, factor, min]: [Dynamic; 3], options: &Map| {
+        call.finish((|| {
+            let factor = finite("the factor", &factor)?;
+            if !(factor > 0.0 && factor <= 1.0) {
+                return Err(Diagnostic::error(format!(
+                    "the factor of an exponential schedule is above 0 and at most 1, got {factor}"
+                )));
+            }
+            Ok(Schedule::Exponential {
+                start: finite("the start", &start)?,
+                factor,
+                min: finite("the minimum", &min)?,
+                unit: unit(per_step(options)?),
+            })
+        })())
+    };
+    type D = Dynamic;
+    let c = context.clone();
+    engine.register_fn("linear", move |n: NativeCallContext, a: D, b: D, over: D| {
+        linear(&Call::new(&c, &n), [a, b, over], &Map::new())
+    });
+    let c = context.clone();
+    engine.register_fn("linear", move |n: NativeCallContext, a: D, b: D, over: D, options: Map| {
+        linear(&Call::new(&c, &n), [a, b, over], &options)
+    });
+    let c = context.clone();
+    engine.register_fn("exponential", move |n: NativeCallContext, a: D, factor: D, min: D| {
+        exponential(&Call::new(&c, &n), [a, factor, min], &Map::new())
+    });
+    let c = context.clone();
+    engine.register_fn(
+        "exponential",
+        move |n: NativeCallContext, a: D, factor: D, min: D, options: Map| {
+            exponential(&Call::new(&c, &n), [a, factor, min], &options)
+        },
+    );
+}
+
+fn finite(what: &str, value: &Dynamic) -> Result<f64, Diagnostic> {
+    number(value).filter(|x| x.is_finite()).ok_or_else(|| {
+        Diagnostic::error(format!("{what} of a schedule is a number, got {}", show(value)))
+    })
+}
+
+fn discretisers(engine: &mut Engine, context: &Rc<Context>) {
+    let c = context.clone();
+    engine.register_fn("bins", move |native: NativeCallContext, map: Map| {
+        let call = Call::new(&c, &native);
+        let dims = map.iter().map(|(key, value)| bin(Ok(key.to_string()), value, call.key(key)));
+        call.finish(dims.collect::<Result<_, _>>().map(DiscretiserDraft::Bins))
+    });
+    let c = context.clone();
+    engine.register_fn("bins", move |native: NativeCallContext, list: Array| {
+        let call = Call::new(&c, &native);
+        let dims = list.iter().enumerate().map(|(i, value)| bin(Err(i), value, call.arg(0)));
+        call.finish(dims.collect::<Result<_, _>>().map(DiscretiserDraft::Bins))
+    });
+    let c = context.clone();
+    engine.register_fn("cells", move |native: NativeCallContext, n: i64, cell: FnPtr| {
+        let call = Call::new(&c, &native);
+        call.finish(
+            shape(&[n.into()])
+                .map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
+        )
+    });
+    let c = context.clone();
+    engine.register_fn("cells", move |native: NativeCallContext, sizes: Array, cell: FnPtr| {
+        let call = Call::new(&c, &native);
+        call.finish(
+            shape(&sizes).map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
+        )
+    });
+}
+
+fn bin(field: Result<String, usize>, value: &Dynamic, spot: Spot) -> Result<BinDraft, Diagnostic> {
+    let label = || match &field {
+        Ok(name) => format!("`{name}`"),
+        Err(i) => format!("number {i}"),
+    };
+    let wrong = || {
+        Diagnostic::error(format!("bin {} is [lo, hi, n], got {}", label(), show(value)))
+            .at(spot.place())
+    };
+    let list = value.read_lock::<Array>().ok_or_else(wrong)?;
+    let [lo, hi, n] = list.as_slice() else { return Err(wrong()) };
+    let (Some(lo), Some(hi)) = (number(lo), number(hi)) else { return Err(wrong()) };
+    let n = whole(&format!("the number of bins of {}", label()), n, 1, 1 << 28)
+        .map_err(|d| d.at(spot.place()))? as usize;
+    if lo >= hi || !lo.is_finite() || !hi.is_finite() {
+        return Err(Diagnostic::error(format!(
+            "bin {} goes from {lo} to {hi}: the lower bound must be below the upper, both finite",
+            label()
+        ))
+        .at(spot.place()));
+    }
+    Ok(BinDraft { field, lo, hi, n, spot })
+}
+
+fn shape(sizes: &[Dynamic]) -> Result<Vec<usize>, Diagnostic> {
+    const MAX: usize = 1 << 28;
+    if sizes.is_empty() {
+        return Err(Diagnostic::error("`cells` needs at least one size"));
+    }
+    let sizes: Vec<usize> = sizes
+        .iter()
+        .map(|n| whole("the number of cells", n, 1, MAX as i64).map(|n| n as usize))
+        .collect::<Result<_, _>>()?;
+    let total = sizes.iter().try_fold(1usize, |product, n| product.checked_mul(*n));
+    if total.is_none_or(|n| n > MAX) {
+        return Err(Diagnostic::error(format!("more than {MAX} cells: use fewer")));
+    }
+    Ok(sizes)
+}

@@ -1,0 +1,51 @@
+//! The keys of an experiment's map: one list for parsing, suggestions, `list` and the docs.
+
+/// A key that `experiment(#{ … })` understands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Key {
+    /// The key.
+    pub name: &'static str,
+    /// Its type, in words.
+    pub kind: &'static str,
+    /// What it does, and its default.
+    pub doc: &'static str,
+}
+
+const fn key(name: &'static str, kind: &'static str, doc: &'static str) -> Key {
+    Key { name, kind, doc }
+}
+
+/// Every key, in the order of the docs.
+pub const KEYS: &[Key] = &[
+    key("name", "string", "the variant's name in tables and files; default: the agent's"),
+    key("env", "id or env(..)", "the environment (required)"),
+    key("agent", "agent", "what learns or plans: q_learning(#{..}), … (required)"),
+    key(
+        "discretiser",
+        "bins(..) or cells(..)",
+        "state → cell; needed where the state is not finite",
+    ),
+    key("episodes", "integer", "episodes per seed; default 500"),
+    key("seeds", "integer or array", "20 means seeds 0 to 19; or the seeds themselves; default 20"),
+    key("max_steps", "integer", "time limit per episode; default: the environment's; 0 for none"),
+    key("threshold", "number", "rolling-mean return that counts as solved; default: Gymnasium's"),
+    key("window", "integer", "episodes in the rolling mean; default 20"),
+    key(
+        "potential",
+        "|s| number",
+        "Φ(s): the host adds γΦ(s′) − Φ(s) with the agent's γ and Φ(terminal) = 0",
+    ),
+    key(
+        "potential_on",
+        "\"cell\" or \"raw\"",
+        "evaluate Φ on the cell's representative (default, keeps the guarantee) or the raw state",
+    ),
+    key("reward", "|t| number", "replaces the reward the agent learns from"),
+    key("terms", "#{ name: |t| number, .. }", "extra reward terms, each logged under its name"),
+    key("notes", "string", "the rationale, carried into the manifest"),
+];
+
+/// Names of all keys.
+pub fn names() -> impl Iterator<Item = &'static str> + Clone {
+    KEYS.iter().map(|k| k.name)
+}

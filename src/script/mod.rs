@@ -1,0 +1,35 @@
+//! The Rhai host: a script's top level builds a plan; its functions are called while training.
+//!
+//! - [`load`] → [`Plan`]: compile, run the top level, resolve every variant
+//! - [`Host`]: one thread's engine, in which callbacks are called
+//! - [`Diagnostic`]: a mistake, with its file, line, column and a suggestion
+//! - [`Value`]: what callbacks may capture; plain data that can cross threads and be hashed
+//!
+//! All contact with Rhai's syntax tree is in `syntax`, all limits are in `engine`, every function
+//! that scripts can call is listed in [`functions`], every key of an experiment in [`keys`].
+
+mod builders;
+mod callback;
+mod diagnostic;
+mod draft;
+mod engine;
+pub mod functions;
+mod host;
+pub mod keys;
+mod numeric;
+mod params;
+mod plan;
+mod resolve;
+mod source;
+mod state;
+mod syntax;
+mod value;
+
+pub use callback::{CallbackFault, Callbacks};
+pub use diagnostic::{Diagnostic, Place, Severity};
+pub use host::{Host, load};
+pub use plan::{
+    Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, Variant,
+};
+pub use source::{Source, SourceSet};
+pub use value::Value;

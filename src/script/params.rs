@@ -1,0 +1,143 @@
+//! Reading typed values out of a script's maps.
+
+use rhai::{Dynamic, Map};
+
+use super::diagnostic::{Diagnostic, suggest};
+use super::draft::{AgentDraft, Spot};
+use super::value::Value;
+use crate::learn::registry::AgentSpec;
+use crate::learn::{ParamValue, Schedule};
+
+/// A value in words, for messages: `"abc"`, `3`, `a function`.
+pub(super) fn show(value: &Dynamic) -> String {
+    let value = value.clone().flatten();
+    if value.is_string() {
+        return format!("{:?}", value.into_string().unwrap_or_default());
+    }
+    if value.is_unit() {
+        return "()".into();
+    }
+    if value.is_fnptr() {
+        return "a function".into();
+    }
+    if value.is_int() || value.is_bool() || value.is_float() || value.is_array() {
+        let text = value.to_string();
+        return if text.chars().count() > 60 { "an array".into() } else { text };
+    }
+    if value.is_map() {
+        return "a map".into();
+    }
+    match value.type_name().rsplit("::").next().unwrap_or_default() {
+        "ExperimentDraft" => "an experiment".into(),
+        "AgentDraft" => "an agent".into(),
+        "EnvDraft" => "an environment".into(),
+        "DiscretiserDraft" => "a discretiser".into(),
+        "StudyDraft" => "a study".into(),
+        "Schedule" => "a schedule".into(),
+        other => format!("a value of type {other}"),
+    }
+}
+
+/// A number, integers included.
+pub(super) fn number(value: &Dynamic) -> Option<f64> {
+    let value = value.clone().flatten();
+    value.as_float().ok().or_else(|| value.as_int().ok().map(|i| i as f64))
+}
+
+/// A string.
+pub(super) fn text(value: &Dynamic) -> Option<String> {
+    let value = value.clone().flatten();
+    value.is_string().then(|| value.into_string().unwrap_or_default())
+}
+
+/// A whole number from `min` to `max`.
+pub(super) fn whole(key: &str, value: &Dynamic, min: i64, max: i64) -> Result<i64, Diagnostic> {
+    match value.clone().flatten().as_int() {
+        Ok(n) if (min..=max).contains(&n) => Ok(n),
+        _ => Err(Diagnostic::error(format!(
+            "`{key}` is a whole number from {min} to {max}, got {}",
+            show(value)
+        ))),
+    }
+}
+
+/// A plain value as JSON, for constructor arguments.
+pub(super) fn json(value: &Dynamic) -> Result<serde_json::Value, String> {
+    fn convert(value: &Value) -> Result<serde_json::Value, String> {
+        Ok(match value {
+            Value::Unit => serde_json::Value::Null,
+            Value::Bool(x) => (*x).into(),
+            Value::Int(x) => (*x).into(),
+            Value::Float(x) => serde_json::Number::from_f64(*x)
+                .map(serde_json::Value::Number)
+                .ok_or_else(|| format!("{x} is not a finite number"))?,
+            Value::Char(x) => x.to_string().into(),
+            Value::Str(x) => x.clone().into(),
+            Value::Array(items) => {
+                serde_json::Value::Array(items.iter().map(convert).collect::<Result<_, _>>()?)
+            }
+            Value::Map(entries) => serde_json::Value::Object(
+                entries
+                    .iter()
+                    .map(|(k, v)| Ok((k.clone(), convert(v)?)))
+                    .collect::<Result<_, String>>()?,
+            ),
+            Value::Fn { .. } => return Err("a function".into()),
+        })
+    }
+    Value::freeze(value).and_then(|v| convert(&v))
+}
+
+/// Merges a map into an agent's parameters; `spot` finds the place of a key.
+pub(super) fn merge_agent(
+    agent: &mut AgentDraft,
+    map: &Map,
+    spot: impl Fn(&str) -> Spot,
+) -> Result<(), Diagnostic> {
+    let spec: &AgentSpec = agent.spec;
+    for (key, value) in map {
+        let place = || spot(key).place();
+        let Some(param) = spec.params.iter().find(|p| p.name == key.as_str()) else {
+            let names: Vec<&str> = spec.params.iter().map(|p| p.name).collect();
+            return Err(Diagnostic::error(format!("`{}` has no parameter `{key}`", spec.name))
+                .at(place())
+                .maybe_hint(suggest(key, names)));
+        };
+        let flat = value.clone().flatten();
+        let raw = if let Ok(n) = flat.as_int() {
+            u64::try_from(n).map_or(ParamValue::Float(n as f64), ParamValue::Int)
+        } else if let Ok(x) = flat.as_float() {
+            ParamValue::Float(x)
+        } else if let Some(schedule) = flat.clone().try_cast::<Schedule>() {
+            ParamValue::Schedule(schedule)
+        } else {
+            ParamValue::Float(f64::NAN)
+        };
+        let accepted = param.kind.accept(raw).ok_or_else(|| {
+            Diagnostic::error(format!(
+                "`{key}` of `{}` is {}, got {}",
+                spec.name,
+                param.kind.allowed(),
+                show(value)
+            ))
+            .at(place())
+        })?;
+        agent.params.insert(param.name, accepted);
+    }
+    Ok(())
+}
+
+/// The `#{ steps: true }` at the end of a schedule.
+pub(super) fn per_step(options: &Map) -> Result<bool, Diagnostic> {
+    let mut steps = false;
+    for (key, value) in options {
+        if key != "steps" {
+            return Err(Diagnostic::error(format!("a schedule has no option `{key}`"))
+                .hint("the only one is `steps: true`"));
+        }
+        steps = value.clone().flatten().as_bool().map_err(|_| {
+            Diagnostic::error(format!("`steps` is true or false, got {}", show(value)))
+        })?;
+    }
+    Ok(steps)
+}

@@ -1,0 +1,387 @@
+//! From what the script wrote to what will run: defaults filled in, names and fields resolved,
+//! callbacks frozen and hashed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+
+use rhai::FnPtr;
+use sha2::{Digest, Sha256};
+
+use super::callback::Callbacks;
+use super::diagnostic::{Diagnostic, suggest};
+use super::draft::{BinDraft, DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
+use super::plan::{Callback, DiscretiserSpec, Expectation, PhiOn, Plan, SeedList, Variant};
+use super::source::{hex, tokens};
+use super::value::Value;
+use crate::env::{self, AnyEnv, EnvError, EnvSpec};
+use crate::learn::AgentConfig;
+use crate::mdp::Schema;
+use crate::shaping::{Bins, Dim};
+
+const EPISODES: u32 = 500;
+const SEEDS: u64 = 20;
+const WINDOW: u32 = 20;
+
+/// Resolves a study.
+pub(super) fn plan(
+    study: StudyDraft,
+    constants: BTreeMap<String, Value>,
+    host: &Rc<Callbacks>,
+) -> Result<Plan, Diagnostic> {
+    let resolver = Resolver { host, constants: &constants };
+    if study.experiments.is_empty() {
+        return Err(Diagnostic::error("the study has no experiments").at(study.spot.place()));
+    }
+    let mut warnings = Vec::new();
+    let mut variants: Vec<Variant> = Vec::with_capacity(study.experiments.len());
+    for draft in &study.experiments {
+        let variant = resolver.variant(draft, &mut warnings)?;
+        if variants.iter().any(|v| v.name == variant.name) {
+            let place = draft.name.as_ref().map_or(draft.spot.place(), |n| n.spot.place());
+            return Err(Diagnostic::error(format!("two variants are called `{}`", variant.name))
+                .at(place)
+                .hint("give each a `name` of its own"));
+        }
+        variants.push(variant);
+    }
+    let names = || variants.iter().map(|v| v.name.as_str());
+    if let Some(baseline) = &study.baseline
+        && !names().any(|n| n == baseline.value)
+    {
+        let names: Vec<&str> = names().collect();
+        return Err(Diagnostic::error(format!("no variant is called `{}`", baseline.value))
+            .at(baseline.spot.place())
+            .maybe_hint(suggest(&baseline.value, names)));
+    }
+    let mut expectations = Vec::with_capacity(study.expectations.len());
+    for (text, check) in &study.expectations {
+        let check = resolver.callback(check, "(r) -> bool", 1)?;
+        expectations.push(Expectation { text: text.clone(), check });
+    }
+    let sources = host.context.sources.borrow().clone();
+    let warnings = warnings.into_iter().map(|w| sources.annotate(w)).collect();
+    Ok(Plan {
+        name: study.name,
+        variants,
+        expectations,
+        baseline: study.baseline.map(|b| b.value),
+        notes: study.notes,
+        golden: study.golden,
+        sources,
+        constants,
+        warnings,
+        printed: host.context.printed.borrow().clone(),
+    })
+}
+
+struct Resolver<'a> {
+    host: &'a Rc<Callbacks>,
+    constants: &'a BTreeMap<String, Value>,
+}
+
+impl Resolver<'_> {
+    fn variant(
+        &self,
+        draft: &ExperimentDraft,
+        warnings: &mut Vec<Diagnostic>,
+    ) -> Result<Variant, Diagnostic> {
+        let missing = |key: &str, hint: &str| {
+            Diagnostic::error(format!("the experiment has no `{key}`"))
+                .at(draft.spot.place())
+                .hint(hint)
+        };
+        let agent = draft.agent.as_ref().ok_or_else(|| {
+            missing("agent", "add, for example, `agent: q_learning(#{ alpha: 0.1 })`")
+        })?;
+        let (spec, any) = environment(draft)?
+            .ok_or_else(|| missing("env", "add, for example, `env: \"CartPole-v1\"`"))?;
+        let kwargs = draft.env.as_ref().map(|e| e.value.kwargs.clone()).unwrap_or_default();
+        let kwargs = spec.resolve_kwargs(&kwargs).map_err(|e| env_error(draft, e))?;
+        let agent = Located {
+            value: AgentConfig { spec: agent.value.spec, params: agent.value.params.clone() },
+            spot: agent.spot.clone(),
+        };
+        let schema = any.schema();
+        let discretiser = self.discretiser(draft, &agent, spec, &any, &schema)?;
+        let potential = self.optional(draft.potential.as_ref(), "(s) -> number")?;
+        if potential.is_some()
+            && draft.potential_raw
+            && !matches!(discretiser, DiscretiserSpec::StateIndex)
+        {
+            warnings.push(
+                Diagnostic::warning(
+                    "a potential of the raw state is not constant on the discretiser's cells",
+                )
+                .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
+                .note("the greedy policy of the discretised problem may change")
+                .hint("leave out `potential_on: \"raw\"` to evaluate it on each cell's representative"),
+            );
+        }
+        if potential.is_some()
+            && !draft.potential_raw
+            && let DiscretiserSpec::Cells { cell, .. } = &discretiser
+        {
+            return Err(Diagnostic::error(format!(
+                "scripted cells (`{}`) have no representative to evaluate the potential on",
+                cell.label
+            ))
+            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
+            .hint("use bins(..), or say `potential_on: \"raw\"`"));
+        }
+        let mut terms = BTreeMap::new();
+        for (name, f) in &draft.terms {
+            terms.insert(name.clone(), self.callback(f, "(t) -> number", 1)?);
+        }
+        Ok(Variant {
+            name: draft
+                .name
+                .as_ref()
+                .map_or(agent.value.spec.name.to_string(), |n| n.value.clone()),
+            place: draft.spot.place(),
+            env: spec,
+            kwargs,
+            agent: agent.value,
+            discretiser,
+            episodes: draft.episodes.unwrap_or(EPISODES),
+            seeds: SeedList(draft.seeds.clone().unwrap_or_else(|| (0..SEEDS).collect())),
+            max_steps: draft.max_steps.or(spec.max_steps).filter(|&n| n > 0),
+            threshold: draft.threshold.or(spec.reward_threshold),
+            window: draft.window.unwrap_or(WINDOW),
+            potential,
+            potential_on: if draft.potential_raw { PhiOn::Raw } else { PhiOn::Cell },
+            reward: self.optional(draft.reward.as_ref(), "(t) -> number")?,
+            terms,
+            notes: draft.notes.clone(),
+        })
+    }
+
+    fn discretiser(
+        &self,
+        draft: &ExperimentDraft,
+        agent: &Located<AgentConfig>,
+        spec: &EnvSpec,
+        env: &AnyEnv,
+        schema: &Schema,
+    ) -> Result<DiscretiserSpec, Diagnostic> {
+        let finite = env.finite().is_some();
+        if agent.value.is_planner() && (!finite || draft.discretiser.is_some()) {
+            let why = if finite { "it plans on the states themselves" } else { "it has none" };
+            return Err(Diagnostic::error(format!(
+                "`{}` needs the finite model of {}: {why}",
+                agent.value.spec.name, spec.id
+            ))
+            .at(agent.spot.place())
+            .hint(if finite {
+                "leave out the discretiser"
+            } else {
+                "q_learning or sarsa learn without a model"
+            }));
+        }
+        match draft.discretiser.as_ref() {
+            None if finite => Ok(DiscretiserSpec::StateIndex),
+            // It does not look at states.
+            None if agent.value.spec.name == "random_agent" => {
+                Ok(DiscretiserSpec::Bins(vec![Dim { field: 0, lo: 0.0, hi: 1.0, n: 1 }]))
+            }
+            None => Err(Diagnostic::error(format!(
+                "`{}` needs a `discretiser`: the states of {} are not finite",
+                agent.value.spec.name, spec.id
+            ))
+            .at(agent.spot.place())
+            .hint(format!("add, for example, `discretiser: {}`", example_bins(schema)))),
+            Some(d) => match &d.value {
+                DiscretiserDraft::Bins(bins) => dims(bins, schema, spec)
+                    .map(DiscretiserSpec::Bins)
+                    .map_err(|e| e.at(d.spot.place())),
+                DiscretiserDraft::Cells { shape, cell } => {
+                    let cell = Located { value: cell.clone(), spot: d.spot.clone() };
+                    let cell = self.callback(&cell, "(s) -> index", 1)?;
+                    Ok(DiscretiserSpec::Cells { shape: shape.clone(), cell })
+                }
+            },
+        }
+    }
+
+    fn optional(
+        &self,
+        f: Option<&Located<FnPtr>>,
+        signature: &str,
+    ) -> Result<Option<Callback>, Diagnostic> {
+        f.map(|f| self.callback(f, signature, 1)).transpose()
+    }
+
+    /// Freezes a function pointer: what it captured becomes plain data, its source is hashed.
+    fn callback(
+        &self,
+        f: &Located<FnPtr>,
+        signature: &str,
+        n_args: usize,
+    ) -> Result<Callback, Diagnostic> {
+        let place = f.spot.place();
+        let fail = |d: Diagnostic| Err(d.at(place.clone()));
+        let name = f.value.fn_name();
+        let is_closure = name.starts_with("anon$");
+        let label = if is_closure { "closure".to_string() } else { name.to_string() };
+        let captures = match Value::freeze_fn(&f.value) {
+            Ok(Value::Fn { captures, .. }) => captures,
+            Ok(_) => Vec::new(),
+            Err(what) => {
+                return fail(Diagnostic::error(format!(
+                    "a function used while training can capture numbers, strings, arrays and maps, \
+                     not {what}"
+                )));
+            }
+        };
+        let arities: Vec<usize> = self
+            .host
+            .ast
+            .iter_functions()
+            .filter(|d| d.name == name)
+            .map(|d| d.params.len())
+            .collect();
+        if arities.is_empty() {
+            return fail(
+                Diagnostic::error(format!("`{label}` is not a function of this script"))
+                    .hint("wrap it in a closure: |s| module::function(s)"),
+            );
+        }
+        if !arities.contains(&(captures.len() + n_args)) {
+            let given = arities[0].saturating_sub(captures.len());
+            let s = if given == 1 { "" } else { "s" };
+            return fail(Diagnostic::error(format!(
+                "`{label}` takes {given} argument{s}; here a function {signature} is expected"
+            )));
+        }
+        let digest = self.digest(name, &captures);
+        Ok(Callback { function: name.to_string(), captures, label, place, digest })
+    }
+
+    /// Hashes everything that can change the function's results. Reachability goes by names, which
+    /// errs on the side of too much.
+    fn digest(&self, function: &str, captures: &[Value]) -> String {
+        let script = self.host.context.sources.borrow().script.clone();
+        let syntax = self.host.context.syntax.borrow();
+        let syntax = &syntax[&*script.name];
+        let functions: BTreeSet<String> =
+            self.host.ast.iter_functions().map(|f| f.name.to_string()).collect();
+        let mut parts = BTreeSet::new();
+        let mut queue = vec![function.to_string()];
+        let mut seen = BTreeSet::new();
+        let mut used = BTreeSet::new();
+        while let Some(name) = queue.pop() {
+            if !seen.insert(name.clone()) {
+                continue;
+            }
+            let Some(body) = syntax.function_tokens(&script.text, &name) else { continue };
+            for token in &body {
+                // Interpolated strings hold code of their own.
+                for word in words(token.text) {
+                    if functions.contains(word) {
+                        queue.push(word.to_string());
+                    }
+                    used.insert(word.to_string());
+                }
+            }
+            let is_entry = name == function;
+            let text = body.iter().map(|t| t.text).collect::<Vec<_>>().join(" ");
+            parts.insert(format!("{} {text}", if is_entry { "entry" } else { "function" }));
+        }
+        for (name, value) in self.constants.iter().filter(|(name, _)| used.contains(*name)) {
+            parts.insert(format!("const {name} = {}", self.canonical(value)));
+        }
+        if syntax.imports.iter().any(|(_, alias)| used.contains(alias)) {
+            for (path, source) in &self.host.context.sources.borrow().imports {
+                let text =
+                    tokens(&source.text).iter().map(|t| t.text).collect::<Vec<_>>().join(" ");
+                parts.insert(format!("import {path} {text}"));
+            }
+        }
+        for (i, value) in captures.iter().enumerate() {
+            parts.insert(format!("capture {i} = {}", self.canonical(value)));
+        }
+        let mut hash = Sha256::new();
+        for part in parts {
+            hash.update((part.len() as u64).to_le_bytes());
+            hash.update(part.as_bytes());
+        }
+        hex(&hash.finalize())
+    }
+
+    /// A value as text, with functions replaced by their digests (their names may be made up).
+    fn canonical(&self, value: &Value) -> String {
+        match value {
+            Value::Fn { name, captures } => format!("fn {}", self.digest(name, captures)),
+            Value::Array(items) => {
+                format!(
+                    "[{}]",
+                    items.iter().map(|v| self.canonical(v)).collect::<Vec<_>>().join(",")
+                )
+            }
+            Value::Map(entries) => {
+                let entries = entries.iter().map(|(k, v)| format!("{k:?}:{}", self.canonical(v)));
+                format!("{{{}}}", entries.collect::<Vec<_>>().join(","))
+            }
+            Value::Float(x) => format!("{:016x}", x.to_bits()),
+            other => format!("{other:?}"),
+        }
+    }
+}
+
+/// The identifiers inside a token (a word is one; a backtick string may hold several).
+fn words(token: &str) -> impl Iterator<Item = &str> {
+    token.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty())
+}
+
+fn environment(draft: &ExperimentDraft) -> Result<Option<(&'static EnvSpec, AnyEnv)>, Diagnostic> {
+    let Some(env) = &draft.env else { return Ok(None) };
+    let spec = env::find(&env.value.id).map_err(|e| env_error(draft, e))?;
+    let any = spec.make(&env.value.kwargs).map_err(|e| env_error(draft, e))?;
+    Ok(Some((spec, any)))
+}
+
+fn env_error(draft: &ExperimentDraft, error: EnvError) -> Diagnostic {
+    let env = draft.env.as_ref();
+    let place = env.and_then(|env| {
+        let key = error.key.as_ref().and_then(|key| env.value.kwarg_spots.get(key));
+        key.and_then(super::draft::Spot::place).or_else(|| env.spot.place())
+    });
+    Diagnostic::error(error.message).at(place).maybe_hint(error.hint)
+}
+
+fn dims(bins: &[BinDraft], schema: &Schema, spec: &EnvSpec) -> Result<Vec<Dim>, Diagnostic> {
+    let mut dims = Vec::with_capacity(bins.len());
+    for bin in bins {
+        let field = match &bin.field {
+            Ok(name) => schema.fields.iter().position(|f| f.name == name).ok_or_else(|| {
+                let names: Vec<&str> = schema.fields.iter().map(|f| f.name).collect();
+                Diagnostic::error(format!("the state of {} has no field `{name}`", spec.id))
+                    .at(bin.spot.place())
+                    .maybe_hint(suggest(name, names))
+            })?,
+            Err(i) if *i < schema.fields.len() => *i,
+            Err(i) => {
+                return Err(Diagnostic::error(format!(
+                    "bin number {i} is one too many: the state of {} has {} fields",
+                    spec.id,
+                    schema.fields.len()
+                ))
+                .at(bin.spot.place()));
+            }
+        };
+        dims.push(Dim { field, lo: bin.lo, hi: bin.hi, n: bin.n });
+    }
+    // In the order of the state's fields, whichever way they were written.
+    dims.sort_by_key(|d| d.field);
+    Bins::new(&dims).map_err(|e| Diagnostic::error(e.message))?;
+    Ok(dims)
+}
+
+/// Bins to suggest: every field, over its declared range or, where that is infinite, ±3.
+fn example_bins(schema: &Schema) -> String {
+    let fields = schema.fields.iter().map(|f| {
+        let lo = if f.low.is_finite() { f.low } else { -3.0 };
+        let hi = if f.high.is_finite() { f.high } else { 3.0 };
+        format!("{}: [{lo:?}, {hi:?}, 12]", f.name)
+    });
+    format!("bins(#{{ {} }})", fields.collect::<Vec<_>>().join(", "))
+}

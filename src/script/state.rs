@@ -1,0 +1,131 @@
+//! What callbacks receive: states and steps.
+
+use std::rc::Rc;
+
+use rhai::{Dynamic, Engine, EvalAltResult, Position};
+
+use super::diagnostic::{Diagnostic, suggest};
+use super::engine::Context;
+use crate::mdp::{FieldKind, Schema};
+use crate::shaping::MAX_FIELDS;
+
+/// A state, as scripts see it: `s.theta`, `s[2]`, and facts such as `s.rows`.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    values: [f64; MAX_FIELDS],
+    schema: Rc<Schema>,
+}
+
+/// A step, as scripts see it.
+#[derive(Debug, Clone)]
+pub(super) struct StepView {
+    pub(super) state: State,
+    pub(super) action: i64,
+    pub(super) reward: f64,
+    pub(super) next_state: State,
+    pub(super) terminated: bool,
+    pub(super) truncated: bool,
+    pub(super) step: i64,
+}
+
+fn value(kind: FieldKind, x: f64) -> Dynamic {
+    match kind {
+        FieldKind::Float => x.into(),
+        FieldKind::Int => (x as i64).into(),
+        FieldKind::Letter => char::from_u32(x as u32).unwrap_or('?').to_string().into(),
+    }
+}
+
+impl State {
+    /// From the fields' numbers, in the schema's order.
+    pub(super) fn new(schema: &Rc<Schema>, fields: &[f64]) -> Self {
+        let mut values = [0.0; MAX_FIELDS];
+        values[..fields.len()].copy_from_slice(fields);
+        Self { values, schema: schema.clone() }
+    }
+
+    fn named(&self, name: &str) -> Option<Dynamic> {
+        if let Some(i) = self.schema.fields.iter().position(|f| f.name == name) {
+            return Some(value(self.schema.fields[i].kind, self.values[i]));
+        }
+        let (_, kind, x) = self.schema.facts.iter().find(|(n, ..)| *n == name)?;
+        Some(value(*kind, *x))
+    }
+
+    fn indexed(&self, index: i64) -> Option<Dynamic> {
+        let n = self.schema.fields.len() as i64;
+        let i = if index < 0 { index.checked_add(n)? } else { index };
+        let i = usize::try_from(i).ok().filter(|i| *i < self.schema.fields.len())?;
+        Some(value(self.schema.fields[i].kind, self.values[i]))
+    }
+
+    /// The state in words: `row 2, col 3, …`.
+    pub(super) fn describe(&self) -> String {
+        let fields = self.schema.fields.iter().zip(&self.values);
+        let text = fields.map(|(f, x)| format!("{} = {}", f.name, value(f.kind, *x)));
+        text.collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn fail<T>(diagnostic: Diagnostic) -> Result<T, Box<EvalAltResult>> {
+    Err(Box::new(EvalAltResult::ErrorRuntime(Dynamic::from(diagnostic), Position::NONE)))
+}
+
+const STEP_FIELDS: [&str; 7] =
+    ["state", "action", "reward", "next_state", "terminated", "truncated", "step"];
+
+/// Registers both types with their properties.
+pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
+    engine.register_type_with_name::<State>("State");
+    engine.register_indexer_get(|s: &mut State, name: &str| {
+        s.named(name).map_or_else(
+            || {
+                let fields = s.schema.fields.iter().map(|f| f.name);
+                let names: Vec<&str> = fields.chain(s.schema.facts.iter().map(|f| f.0)).collect();
+                fail(
+                    Diagnostic::error(format!("this environment's state has no field `{name}`"))
+                        .maybe_hint(suggest(name, names)),
+                )
+            },
+            Ok,
+        )
+    });
+    engine.register_indexer_get(|s: &mut State, index: i64| {
+        s.indexed(index).map_or_else(
+            || {
+                let n = s.schema.fields.len();
+                fail(Diagnostic::error(format!(
+                    "index {index} is outside the state, which has {n} fields (0 to {})",
+                    n - 1
+                )))
+            },
+            Ok,
+        )
+    });
+    engine.register_indexer_set(|_: &mut State, name: &str, _: Dynamic| {
+        fail::<()>(Diagnostic::error(format!("states are read-only: `{name}` cannot be assigned")))
+    });
+    engine.register_indexer_set(|_: &mut State, index: i64, _: Dynamic| {
+        fail::<()>(Diagnostic::error(format!("states are read-only: [{index}] cannot be assigned")))
+    });
+    engine.register_fn("to_string", |s: &mut State| format!("#{{{}}}", s.describe()));
+    engine.register_fn("to_debug", |s: &mut State| format!("#{{{}}}", s.describe()));
+    engine.register_fn("len", |s: &mut State| s.schema.fields.len() as i64);
+
+    engine.register_type_with_name::<StepView>("Step");
+    engine.register_get("state", |t: &mut StepView| t.state.clone());
+    engine.register_get("action", |t: &mut StepView| t.action);
+    engine.register_get("reward", |t: &mut StepView| t.reward);
+    engine.register_get("next_state", |t: &mut StepView| t.next_state.clone());
+    engine.register_get("terminated", |t: &mut StepView| t.terminated);
+    engine.register_get("truncated", |t: &mut StepView| t.truncated);
+    let step_read = context.step_read.clone();
+    engine.register_get("step", move |t: &mut StepView| {
+        step_read.set(true);
+        t.step
+    });
+    engine.register_indexer_get(|_: &mut StepView, name: &str| {
+        let diagnostic = Diagnostic::error(format!("a step has no field `{name}`"));
+        fail::<Dynamic>(diagnostic.maybe_hint(suggest(name, STEP_FIELDS)))
+    });
+}

@@ -1,0 +1,234 @@
+//! Uniform bins: exactly NumPy's `digitize(x, linspace(lo, hi, n + 1)) - 1`, clamped to `0..n`.
+
+use super::{Discretiser, Fault, MAX_FIELDS};
+use crate::mdp::Env;
+
+/// One binned field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dim {
+    /// Which field of the state: an index into `Schema::fields`.
+    pub field: usize,
+    /// Left edge of the first bin; smaller values fall into it too.
+    pub lo: f64,
+    /// Right edge of the last bin; larger values fall into it too.
+    pub hi: f64,
+    /// Number of bins.
+    pub n: usize,
+}
+
+/// Why bins cannot be made. `dim` is the position in the list that was given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BinsError {
+    /// Which dimension is at fault.
+    pub dim: usize,
+    /// What is wrong with it.
+    pub message: String,
+}
+
+/// A product of uniform bins over some of the state's fields. Cells are numbered row-major: the
+/// last dimension varies fastest.
+#[derive(Debug, Clone)]
+pub struct Bins {
+    dims: Vec<BinnedDim>,
+    n_cells: usize,
+}
+
+#[derive(Debug, Clone)]
+struct BinnedDim {
+    field: usize,
+    lo: f64,
+    per_width: f64,
+    /// `n + 1` edges, as `numpy.linspace(lo, hi, n + 1)` computes them.
+    edges: Vec<f64>,
+}
+
+/// Cells of a table above which memory, not learning, would be the problem: 2^28 states.
+const MAX_CELLS: usize = 1 << 28;
+
+impl Bins {
+    /// Bins over `dims`.
+    ///
+    /// # Errors
+    /// If there is no dimension, one has `lo >= hi`, a bound is not finite, `n` is 0, the same
+    /// field is binned twice, or the product of the `n` exceeds 2^28.
+    pub fn new(dims: &[Dim]) -> Result<Self, BinsError> {
+        let fail = |dim, message: String| Err(BinsError { dim, message });
+        if dims.is_empty() {
+            return fail(0, "bins need at least one field".into());
+        }
+        let mut n_cells = 1usize;
+        let mut binned: Vec<BinnedDim> = Vec::with_capacity(dims.len());
+        for (i, d) in dims.iter().enumerate() {
+            if !(d.lo.is_finite() && d.hi.is_finite()) {
+                return fail(
+                    i,
+                    format!("the bounds of a bin are finite, got {} and {}", d.lo, d.hi),
+                );
+            }
+            if d.lo >= d.hi {
+                return fail(
+                    i,
+                    format!("the lower bound {} is not below the upper {}", d.lo, d.hi),
+                );
+            }
+            if d.n == 0 {
+                return fail(i, "the number of bins is at least 1, got 0".into());
+            }
+            if binned.iter().any(|b| b.field == d.field) {
+                return fail(i, "this field is binned twice".into());
+            }
+            n_cells = match n_cells.checked_mul(d.n) {
+                Some(n) if n <= MAX_CELLS => n,
+                _ => return fail(i, format!("more than {MAX_CELLS} cells: use fewer bins")),
+            };
+            binned.push(BinnedDim {
+                field: d.field,
+                lo: d.lo,
+                per_width: d.n as f64 / (d.hi - d.lo),
+                edges: linspace(d.lo, d.hi, d.n + 1),
+            });
+        }
+        Ok(Self { dims: binned, n_cells })
+    }
+
+    /// Number of cells.
+    pub fn n_cells(&self) -> usize {
+        self.n_cells
+    }
+
+    /// The cell of a state, given all its fields.
+    #[inline]
+    pub fn index(&self, fields: &[f64]) -> usize {
+        let mut cell = 0;
+        for d in &self.dims {
+            cell = cell * (d.edges.len() - 1) + d.bin(fields[d.field]);
+        }
+        cell
+    }
+
+    /// The centre of `cell`: overwrites the binned fields of `fields` and leaves the others.
+    pub fn centre(&self, mut cell: usize, fields: &mut [f64]) {
+        for d in self.dims.iter().rev() {
+            let n = d.edges.len() - 1;
+            let k = cell % n;
+            cell /= n;
+            fields[d.field] = f64::midpoint(d.edges[k], d.edges[k + 1]);
+        }
+    }
+}
+
+impl BinnedDim {
+    /// The bin of `x`: a guess by multiplication, put right against the exact edges, so that the
+    /// answer is NumPy's binary search's without its branches. NaN goes to the last bin, as there.
+    #[inline]
+    fn bin(&self, x: f64) -> usize {
+        let last = self.edges.len() - 2;
+        if x.is_nan() {
+            return last;
+        }
+        // `as` saturates: anything below the range becomes 0, anything above is cut to `last`.
+        let mut k = (((x - self.lo) * self.per_width) as usize).min(last);
+        while k > 0 && x < self.edges[k] {
+            k -= 1;
+        }
+        while k < last && x >= self.edges[k + 1] {
+            k += 1;
+        }
+        k
+    }
+}
+
+/// `numpy.linspace(lo, hi, num)`, bit for bit: `i * step + lo`, and exactly `hi` at the end.
+fn linspace(lo: f64, hi: f64, num: usize) -> Vec<f64> {
+    let step = (hi - lo) / (num - 1) as f64;
+    let mut edges: Vec<f64> = (0..num).map(|i| i as f64 * step + lo).collect();
+    edges[num - 1] = hi;
+    edges
+}
+
+impl<E: Env> Discretiser<E> for Bins {
+    fn n_cells(&self) -> usize {
+        self.n_cells
+    }
+
+    #[inline]
+    fn cell(&mut self, env: &E, obs: &E::Obs) -> Result<usize, Fault> {
+        let mut fields = [0.0; MAX_FIELDS];
+        env.fields(obs, &mut fields);
+        Ok(self.index(&fields))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bins(lo: f64, hi: f64, n: usize) -> Bins {
+        Bins::new(&[Dim { field: 0, lo, hi, n }]).unwrap()
+    }
+
+    /// `numpy.digitize` as its documentation defines it: how many edges are <= x.
+    fn digitize(x: f64, edges: &[f64]) -> usize {
+        edges.iter().filter(|&&e| e <= x).count()
+    }
+
+    #[test]
+    fn edges_are_numpys() {
+        // numpy.linspace(-2.4, 2.4, 13)[4] and [6]: the middle is not 0, and must not be.
+        let edges = linspace(-2.4, 2.4, 13);
+        assert_eq!(edges[4], -0.799_999_999_999_999_8);
+        assert_eq!(edges[6], 0.0);
+        assert_eq!(
+            linspace(0.0, 0.3, 4),
+            [0.0, 0.099_999_999_999_999_99, 0.199_999_999_999_999_98, 0.3]
+        );
+    }
+
+    #[test]
+    fn a_bin_is_where_digitize_puts_it_at_every_edge_and_next_to_it() {
+        for (lo, hi, n) in [(-2.4, 2.4, 12), (-0.5, 0.5, 24), (-1.2, 0.6, 40), (0.0, 0.3, 7)] {
+            let b = bins(lo, hi, n);
+            let edges = linspace(lo, hi, n + 1);
+            for &e in &edges {
+                for x in [e, e.next_up(), e.next_down(), e + 1e-3, e - 1e-3, e * 1e9] {
+                    let expected = digitize(x, &edges).saturating_sub(1).min(n - 1);
+                    assert_eq!(b.index(&[x]), expected, "{x} in {lo}..{hi} / {n}");
+                }
+            }
+            assert_eq!(b.index(&[f64::NEG_INFINITY]), 0);
+            assert_eq!(b.index(&[f64::INFINITY]), n - 1);
+            assert_eq!(b.index(&[f64::NAN]), n - 1);
+        }
+    }
+
+    #[test]
+    fn cells_are_row_major_and_their_centres_fall_into_them() {
+        let b = Bins::new(&[
+            Dim { field: 2, lo: -1.0, hi: 1.0, n: 3 },
+            Dim { field: 0, lo: 0.0, hi: 8.0, n: 4 },
+        ])
+        .unwrap();
+        assert_eq!(b.n_cells(), 12);
+        assert_eq!(b.index(&[5.0, 9.0, 0.9]), 2 * 4 + 2);
+        let mut fields = [0.0, 7.0, 0.0];
+        for cell in 0..12 {
+            b.centre(cell, &mut fields);
+            assert_eq!(b.index(&fields), cell);
+            assert_eq!(fields[1], 7.0);
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_its_dimension() {
+        let dim = |lo, hi, n| Dim { field: 0, lo, hi, n };
+        for bad in
+            [dim(1.0, 1.0, 3), dim(2.0, 1.0, 3), dim(0.0, f64::INFINITY, 3), dim(0.0, 1.0, 0)]
+        {
+            let ok = Dim { field: 1, ..dim(0.0, 1.0, 2) };
+            assert_eq!(Bins::new(&[ok, bad]).unwrap_err().dim, 1);
+        }
+        assert!(Bins::new(&[]).is_err());
+        assert!(Bins::new(&[dim(0.0, 1.0, 2), dim(0.0, 1.0, 2)]).is_err());
+        assert!(Bins::new(&[dim(0.0, 1.0, 1 << 29)]).is_err());
+    }
+}

@@ -1,0 +1,42 @@
+//! What stands between an environment and a learner: rewards, potentials and discretisers.
+//!
+//! - [`Discretiser`]: observation → cell. [`StateIndex`], [`Bins`], [`ScriptedCells`]
+//! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`RawPotential`]
+//! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
+//!   [`ScriptedReward`]
+//! - [`potential_term`]: `γΦ(s′) − Φ(s)`, with Φ(terminal) = 0, in the one place where it is computed
+//!
+//! The training loop is generic over all three, so that the step compiles to straight code; scripts
+//! implement them through the function objects of [`ScriptedCells`], [`RawPotential`] and
+//! [`ScriptedReward`].
+
+mod bins;
+mod discretiser;
+mod potential;
+mod reward;
+
+pub use bins::{Bins, BinsError, Dim};
+pub use discretiser::{CellFn, Discretiser, ScriptedCells, StateIndex};
+pub use potential::{
+    AnyPotential, CellPhiFn, CellPotential, NoPotential, PhiFn, Potential, RawPotential,
+    potential_term, shaped_model,
+};
+pub use reward::{
+    AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,
+};
+
+/// The largest number of fields a state may have: lets the step use a buffer on the stack.
+pub const MAX_FIELDS: usize = 16;
+
+/// A callback failed while training. Carries the script's own error, so that the floors above can
+/// show its place.
+#[derive(Debug)]
+pub struct Fault(pub Box<dyn std::error::Error + Send + Sync>);
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl std::error::Error for Fault {}
