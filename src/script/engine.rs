@@ -80,14 +80,18 @@ pub(super) fn engine(context: &Rc<Context>) -> Engine {
     engine
 }
 
-/// Limits and vocabulary: what decides whether a text parses at all.
-fn limits(engine: &mut Engine) {
-    // Rhai reserves `with` without using it; here it is a method of experiments.
+/// Rhai reserves `with` without using it; here it is a method of experiments.
+pub(super) fn vocabulary(engine: &mut Engine) {
     #[expect(deprecated, reason = "marked volatile, not going away")]
     engine.on_parse_token(|token, _, _| match token {
         Token::Reserved(word) if *word == "with" => Token::Identifier(word),
         other => other,
     });
+}
+
+/// Limits and vocabulary: what decides whether a text parses at all.
+fn limits(engine: &mut Engine) {
+    vocabulary(engine);
     engine.disable_symbol("eval");
     engine.set_max_operations(PLAN_OPERATIONS);
     engine.set_max_call_levels(48);

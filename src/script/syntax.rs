@@ -173,6 +173,7 @@ mod tests {
     fn syntax(text: &str) -> (AST, Syntax) {
         let mut engine = Engine::new_raw();
         engine.set_optimization_level(rhai::OptimizationLevel::None);
+        super::super::engine::vocabulary(&mut engine);
         let ast = engine.compile(text).unwrap();
         let syntax = Syntax::of(&ast);
         (ast, syntax)
