@@ -1,5 +1,6 @@
 //! `runner exec SCRIPT`
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -147,7 +148,7 @@ fn resume(args: &Args) -> String {
     let mut command = format!("runner exec {}", args.script.display());
     let mut add = |flag: &str, value: Option<String>| {
         if let Some(value) = value {
-            command.push_str(&format!(" {flag} {value}"));
+            let _ = write!(command, " {flag} {value}");
         }
     };
     add("--out", args.out.as_ref().map(|p| p.display().to_string()));

@@ -14,7 +14,7 @@ use crate::mdp::streams::Stream;
 pub(super) struct Args {
     /// The environment's id
     env: String,
-    /// Constructor arguments as JSON, for example '{"is_slippery": false}'
+    /// Constructor arguments as JSON, for example `{"is_slippery": false}`
     #[arg(long, value_name = "JSON", default_value = "{}")]
     kwargs: String,
     /// Seed of the first reset, as in Gymnasium's reset(seed=N)

@@ -1,5 +1,6 @@
 //! Runs all units of a plan on threads.
 
+use std::collections::BTreeSet;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
@@ -70,6 +71,9 @@ impl From<StoreError> for ExecuteError {
 ///
 /// # Errors
 /// The error of the first failing unit in the plan's order among those that ran.
+///
+/// # Panics
+/// Only if a worker thread has panicked: a bug.
 pub fn execute(
     plan: &Plan,
     store: &Store,
@@ -78,9 +82,10 @@ pub fn execute(
 ) -> Result<Execution, ExecuteError> {
     let all = units(plan);
     let mut todo = Vec::new();
+    let mut seen = BTreeSet::new();
     for (i, unit) in all.iter().enumerate() {
         // Two variants that differ in name only are one unit.
-        let twin = all[..i].iter().any(|u| u.hash == unit.hash);
+        let twin = !seen.insert(unit.hash.as_str());
         if twin || store.has(unit)? {
             progress.units.fetch_add(1, Ordering::Relaxed);
             let episodes = u64::from(plan.variants[unit.variant].episodes);

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use sha2::{Digest, Sha256};
 
 use super::audit::{Audit, audit_variant};
+use super::hex;
 use super::record::UnitRecord;
 use super::unit::{UnitError, run_unit};
 use crate::env::EnvVisitor;
@@ -102,8 +103,7 @@ fn returns(variant: &Variant, record: &UnitRecord, out: &mut String) {
 
 /// Pins every set without listing them all.
 fn digest(sets: &[Vec<usize>]) -> String {
-    let hash = Sha256::digest(format!("{sets:?}").as_bytes());
-    hash.iter().take(8).map(|b| format!("{b:02x}")).collect()
+    hex(&Sha256::digest(format!("{sets:?}").as_bytes())[..8])
 }
 
 /// What is needed of the environment to draw.

@@ -18,6 +18,15 @@ mod store;
 mod train;
 mod unit;
 
+/// Bytes in hexadecimal.
+fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write;
+    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, b| {
+        write!(text, "{b:02x}").expect("writing to a string does not fail");
+        text
+    })
+}
+
 pub use audit::{Audit, audit_variant};
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};

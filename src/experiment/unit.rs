@@ -4,9 +4,9 @@ use std::sync::atomic::AtomicBool;
 
 use sha2::{Digest, Sha256};
 
-use super::assemble;
 use super::record::{EpisodeRow, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
+use super::{assemble, hex};
 use crate::env::EnvVisitor;
 use crate::learn::registry::AgentVisitor;
 use crate::learn::{Agent, AnyAgent};
@@ -44,8 +44,7 @@ pub fn units(plan: &Plan) -> Vec<Unit> {
                 "variant": identity,
                 "seed": seed,
             });
-            let hash = Sha256::digest(whole.to_string().as_bytes());
-            let hash = hash.iter().map(|b| format!("{b:02x}")).collect();
+            let hash = hex(&Sha256::digest(whole.to_string().as_bytes()));
             units.push(Unit { variant, seed, hash });
         }
     }

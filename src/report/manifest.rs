@@ -23,8 +23,10 @@ pub fn circumstance(jobs: usize) -> Value {
     })
 }
 
+/// Without the folder: where a script lies does not change what it does.
 fn source(source: &Source) -> Value {
-    json!({ "name": &*source.name, "sha256": source.sha256() })
+    let name = source.name.rsplit(['/', '\\']).next();
+    json!({ "name": name, "sha256": source.sha256() })
 }
 
 /// The manifest of `plan`.

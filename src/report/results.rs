@@ -56,6 +56,9 @@ impl Results {
     ///
     /// # Errors
     /// If the folder holds something else, or cannot be written.
+    ///
+    /// # Panics
+    /// Never: the manifest is plain data.
     pub fn open(folder: &Path, plan: &Plan, jobs: usize, fresh: bool) -> Result<Self, FolderError> {
         owned_by(folder, plan)?;
         std::fs::create_dir_all(folder).map_err(|e| FolderError {
@@ -191,6 +194,9 @@ impl Results {
 }
 
 /// A variant's statistics and verdict as one JSON object: what expectations see as `r.<name>`.
+///
+/// # Panics
+/// Never: both are plain data.
 pub fn variant_json(summary: &VariantSummary, audit: &Audit) -> Value {
     let mut value = serde_json::to_value(summary).expect("plain data");
     value["audit"] = serde_json::to_value(audit).expect("plain data");

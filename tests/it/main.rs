@@ -1,4 +1,11 @@
 //! Integration tests: one binary, one module a subject.
 
+mod cli;
+mod crash;
 mod env;
+mod floors;
+mod frozen_lake;
+mod golden;
 mod parity;
+mod shaping;
+mod support;

@@ -1,0 +1,147 @@
+//! The files of a unit: `monitor.csv`, `policy.csv`, `sweeps.csv`, and the marks in `result.json`.
+
+use std::fmt::Write;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::experiment::hex;
+use crate::experiment::record::{EpisodeRow, UnitRecord};
+use crate::learn::{QTable, argmax_tol};
+use crate::mdp::Ending;
+use crate::script::{DiscretiserSpec, Variant};
+
+/// Layout of the unit files; raised when it changes.
+pub(super) const SCHEMA: u32 = 1;
+
+/// What `result.json` says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct ResultFile {
+    pub(super) schema: u32,
+    pub(super) unit: String,
+    pub(super) env: String,
+    pub(super) seed: u64,
+    pub(super) episodes: u32,
+    pub(super) steps: u64,
+    /// Shape of the table of action values.
+    pub(super) states: usize,
+    pub(super) actions: usize,
+    pub(super) files: std::collections::BTreeMap<String, FileMark>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct FileMark {
+    bytes: u64,
+    sha256: String,
+}
+
+pub(super) fn mark(bytes: &[u8]) -> FileMark {
+    FileMark { bytes: bytes.len() as u64, sha256: hex(&Sha256::digest(bytes)) }
+}
+
+/// A float as the shortest text that reads back as the same float.
+fn float(x: f64) -> String {
+    format!("{x:?}")
+}
+
+fn csv_bytes(writer: csv::Writer<Vec<u8>>) -> Vec<u8> {
+    writer.into_inner().expect("writing to memory does not fail")
+}
+
+const NEVER: &str = "writing to memory does not fail";
+
+/// Stable-Baselines3's monitor format: a JSON comment, then r, l, t and columns of our own. The
+/// time t is 0: wall time would make two equal runs differ; it is in `timing.json`.
+pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
+    let mut bytes =
+        format!("#{{\"t_start\": 0.0, \"env_id\": \"{}\"}}\n", variant.env.id).into_bytes();
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let mut header = vec!["r", "l", "t", "learned_return", "shaping", "epsilon", "ending"];
+    header.extend(variant.terms.keys().map(String::as_str));
+    csv.write_record(&header).expect(NEVER);
+    for row in &record.rows {
+        let mut line = vec![
+            float(row.native),
+            row.steps.to_string(),
+            "0".into(),
+            float(row.learned),
+            float(row.shaping),
+            float(row.epsilon),
+            row.ending.as_str().to_string(),
+        ];
+        line.extend(row.terms.iter().map(|x| float(*x)));
+        csv.write_record(&line).expect(NEVER);
+    }
+    bytes.extend(csv_bytes(csv));
+    bytes
+}
+
+pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(bytes);
+    let mut rows = Vec::new();
+    for (i, line) in reader.records().enumerate() {
+        let line = line.map_err(|e| e.to_string())?;
+        let bad = || format!("episode {i} cannot be read");
+        let number = |k: usize| line.get(k).and_then(|s| s.parse::<f64>().ok()).ok_or_else(bad);
+        rows.push(EpisodeRow {
+            native: number(0)?,
+            steps: line.get(1).and_then(|s| s.parse().ok()).ok_or_else(bad)?,
+            learned: number(3)?,
+            shaping: number(4)?,
+            epsilon: number(5)?,
+            ending: match line.get(6) {
+                Some("terminated") => Ending::Terminated,
+                Some("truncated") => Ending::Truncated,
+                _ => return Err(bad()),
+            },
+            terms: (7..line.len()).map(number).collect::<Result<_, _>>()?,
+        });
+    }
+    Ok(rows)
+}
+
+/// `state,greedy,q_0,…`: every state whose values differ from the initial ones, the states of a
+/// finite environment all.
+pub(super) fn policy(variant: &Variant, q: &QTable) -> Vec<u8> {
+    let initial =
+        variant.agent.params.contains_key("initial_q").then(|| variant.agent.float("initial_q"));
+    let all = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let mut header = vec!["state".to_string(), "greedy".to_string()];
+    header.extend((0..q.n_actions()).map(|a| format!("q_{a}")));
+    csv.write_record(&header).expect(NEVER);
+    for s in 0..q.n_states() {
+        let row = q.row(s);
+        if !all && initial.is_some_and(|x| row.iter().all(|v| v.to_bits() == x.to_bits())) {
+            continue;
+        }
+        let mut line = vec![s.to_string(), argmax_tol(row).to_string()];
+        line.extend(row.iter().map(|x| float(*x)));
+        csv.write_record(&line).expect(NEVER);
+    }
+    csv_bytes(csv)
+}
+
+pub(super) fn read_policy(
+    bytes: &[u8],
+    n_actions: usize,
+) -> Result<Vec<(usize, Vec<f64>)>, String> {
+    let mut reader = csv::Reader::from_reader(bytes);
+    let mut table = Vec::new();
+    for (i, line) in reader.records().enumerate() {
+        let line = line.map_err(|e| e.to_string())?;
+        let bad = || format!("line {} cannot be read", i + 2);
+        let state = line.get(0).and_then(|s| s.parse().ok()).ok_or_else(bad)?;
+        let values: Option<Vec<f64>> = line.iter().skip(2).map(|s| s.parse().ok()).collect();
+        table.push((state, values.filter(|v| v.len() == n_actions).ok_or_else(bad)?));
+    }
+    Ok(table)
+}
+
+pub(super) fn sweeps(changes: &[f64]) -> Vec<u8> {
+    let mut text = String::from("sweep,largest_change\n");
+    for (i, change) in changes.iter().enumerate() {
+        writeln!(text, "{},{}", i + 1, float(*change)).expect(NEVER);
+    }
+    text.into_bytes()
+}
