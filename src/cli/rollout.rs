@@ -61,17 +61,14 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut session = Session::new(&args.env, &kwargs)?;
     let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
     let (Format::Jsonl, Policy::Random) = (args.format, args.policy);
-    let played = match &args.actions {
-        Some(actions) => {
-            let actions = parse_actions(actions)?;
-            rollout_actions(&mut session, &seed, &actions, &mut stdout)
-        }
-        None => {
-            let n_actions = session.schema().actions.len();
-            let mut stream = Stream::new(seed.words()[0].into(), "policy");
-            let policy = |_: &Observation| stream.below(n_actions) as i64;
-            rollout(&mut session, &seed, args.steps, policy, &mut stdout)
-        }
+    let played = if let Some(actions) = &args.actions {
+        let actions = parse_actions(actions)?;
+        rollout_actions(&mut session, &seed, &actions, &mut stdout)
+    } else {
+        let n_actions = session.schema().actions.len();
+        let mut stream = Stream::new(seed.words()[0].into(), "policy");
+        let policy = |_: &Observation| stream.below(n_actions) as i64;
+        rollout(&mut session, &seed, args.steps, policy, &mut stdout)
     };
     let flushed = stdout.flush();
     match played {

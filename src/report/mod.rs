@@ -1,7 +1,7 @@
 //! What a study looks like from outside: summaries, tables and plots of results.
 //!
 //! - [`results`]: the results folder and every file derived from its units
-//! - [`manifest`]: `study.json`
+//! - [`manifest`] writes `study.json`
 //! - [`summary`]: per-variant statistics, as in `summary.json`
 //! - [`curves`]: learning curves as SVG
 //! - [`table`]: the closing table in the terminal

@@ -215,23 +215,24 @@ fn owned_by(folder: &Path, plan: &Plan) -> Result<(), FolderError> {
         return refuse("is a file, not a results folder".into());
     }
     let manifest = folder.join("study.json");
-    match std::fs::read(&manifest) {
-        Ok(bytes) => match serde_json::from_slice::<Value>(&bytes) {
-            Ok(old) if old["study"] == plan.name.as_str() => Ok(()),
-            Ok(old) => refuse(format!(
-                "holds the results of the study {}, not of \"{}\"",
-                old["study"], plan.name
-            )),
-            Err(e) => refuse(format!("study.json is not a manifest ({e})")),
-        },
-        Err(_) => {
-            let occupied = std::fs::read_dir(folder).is_ok_and(|mut d| {
-                d.any(|entry| {
-                    entry.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with(".tmp-"))
-                })
-            });
-            if occupied { refuse("is not empty and not a results folder".into()) } else { Ok(()) }
-        }
+    let Ok(bytes) = std::fs::read(&manifest) else {
+        let ours = |name: &str| name.starts_with(".tmp-");
+        let occupied = std::fs::read_dir(folder).is_ok_and(|mut entries| {
+            entries.any(|e| e.is_ok_and(|e| !ours(&e.file_name().to_string_lossy())))
+        });
+        return if occupied {
+            refuse("is not empty and not a results folder".into())
+        } else {
+            Ok(())
+        };
+    };
+    match serde_json::from_slice::<Value>(&bytes) {
+        Ok(old) if old["study"] == plan.name.as_str() => Ok(()),
+        Ok(old) => refuse(format!(
+            "holds the results of the study {}, not of \"{}\"",
+            old["study"], plan.name
+        )),
+        Err(e) => refuse(format!("study.json is not a manifest ({e})")),
     }
 }
 

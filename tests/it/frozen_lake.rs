@@ -11,7 +11,7 @@ use serde_json::json;
 
 const GAMMA: f64 = 0.99;
 
-fn lake(kwargs: serde_json::Value) -> (FiniteMdp, Schema) {
+fn lake(kwargs: &serde_json::Value) -> (FiniteMdp, Schema) {
     let env = make("FrozenLake-v1", kwargs.as_object().unwrap()).unwrap();
     ((**env.finite().unwrap()).clone(), env.schema())
 }
@@ -66,7 +66,7 @@ fn cases() -> Vec<serde_json::Value> {
 #[test]
 fn value_iteration_keeps_the_greedy_sets_and_q_plus_phi() {
     for kwargs in cases() {
-        let (mdp, schema) = lake(kwargs.clone());
+        let (mdp, schema) = lake(&kwargs);
         let reachable = mdp.reachable();
         let plain = solve(&mdp, &vec![0.0; mdp.n_states()]);
         for scale in [0.01, 0.05, 1.0, 1000.0] {
@@ -91,7 +91,7 @@ fn value_iteration_keeps_the_greedy_sets_and_q_plus_phi() {
 #[test]
 fn the_audit_agrees_on_every_case() {
     for kwargs in cases() {
-        let (mdp, schema) = lake(kwargs.clone());
+        let (mdp, schema) = lake(&kwargs);
         for scale in [0.05, 1.0, 100.0] {
             let phi = distance(&schema, scale);
             let result = judge(&mdp, &shaped_model(&mdp, GAMMA, &phi), &phi);
@@ -107,7 +107,7 @@ fn judge(plain: &FiniteMdp, shaped: &FiniteMdp, phi: &[f64]) -> Preservation {
 
 #[test]
 fn a_terminal_potential_fails_the_check() {
-    let (mdp, schema) = lake(json!({ "map_name": "8x8" }));
+    let (mdp, schema) = lake(&json!({ "map_name": "8x8" }));
     let phi = distance(&schema, 0.05);
     // The mistake of many tutorials: Φ of the terminal state is kept. Holes lie closer to the goal
     // than the start, so that drowning is paid for.
@@ -119,7 +119,7 @@ fn a_terminal_potential_fails_the_check() {
 
 #[test]
 fn a_wrong_gamma_fails_the_check() {
-    let (mdp, schema) = lake(json!({ "map_name": "8x8" }));
+    let (mdp, schema) = lake(&json!({ "map_name": "8x8" }));
     let phi = distance(&schema, 0.05);
     let result = judge(&mdp, &shaped_model(&mdp, 1.0, &phi), &phi);
     assert!(!result.identity_holds());
@@ -130,7 +130,7 @@ fn a_wrong_gamma_fails_the_check() {
 #[test]
 fn taught_rewards_change_as_many_states_as_they_should() {
     let changed = |slippery: bool, f: &dyn Fn(usize, usize, bool, f64) -> f64| {
-        let (mdp, _) = lake(json!({ "map_name": "8x8", "is_slippery": slippery }));
+        let (mdp, _) = lake(&json!({ "map_name": "8x8", "is_slippery": slippery }));
         let wrong = mdp
             .with_rewards(|s, _, o| o.reward + f(s, o.next_state as usize, o.terminated, o.reward));
         let states = judge(&mdp, &wrong, &vec![0.0; 64]).states_changed.len();
@@ -151,7 +151,7 @@ fn taught_rewards_change_as_many_states_as_they_should() {
 #[test]
 fn value_iteration_agrees_with_policy_iteration() {
     for kwargs in cases() {
-        let (mdp, _) = lake(kwargs);
+        let (mdp, _) = lake(&kwargs);
         let exact = PolicyIteration { gamma: GAMMA }.solve(&mdp).unwrap();
         let iterated = solve(&mdp, &vec![0.0; mdp.n_states()]);
         for (a, b) in exact.values().iter().zip(iterated.values()) {
@@ -163,7 +163,7 @@ fn value_iteration_agrees_with_policy_iteration() {
 /// Sweep by sweep, shaped value iteration from −Φ is plain value iteration from 0, minus Φ.
 #[test]
 fn shaped_sweeps_are_plain_sweeps_minus_phi() {
-    let (mdp, schema) = lake(json!({ "map_name": "8x8" }));
+    let (mdp, schema) = lake(&json!({ "map_name": "8x8" }));
     let phi = distance(&schema, 1.0);
     let shaped_mdp = shaped_model(&mdp, GAMMA, &phi);
     let minus: Vec<f64> = phi.iter().map(|x| -x).collect();
@@ -183,15 +183,15 @@ fn shaped_sweeps_are_plain_sweeps_minus_phi() {
 
 #[test]
 fn optimal_actions_of_the_4x4_lake() {
-    let (mdp, schema) = lake(json!({ "map_name": "4x4" }));
+    let (mdp, schema) = lake(&json!({ "map_name": "4x4" }));
     insta::assert_snapshot!(map(&schema, &mdp, &solve(&mdp, &[0.0; 16])));
-    let (mdp, schema) = lake(json!({ "map_name": "4x4", "is_slippery": false }));
+    let (mdp, schema) = lake(&json!({ "map_name": "4x4", "is_slippery": false }));
     insta::assert_snapshot!(map(&schema, &mdp, &solve(&mdp, &[0.0; 16])));
 }
 
 #[test]
 fn optimal_actions_of_the_8x8_lake_plain_and_shaped() {
-    let (mdp, schema) = lake(json!({ "map_name": "8x8" }));
+    let (mdp, schema) = lake(&json!({ "map_name": "8x8" }));
     let phi = distance(&schema, 0.05);
     let plain = map(&schema, &mdp, &solve(&mdp, &[0.0; 64]));
     let shaped = map(&schema, &mdp, &solve(&shaped_model(&mdp, GAMMA, &phi), &phi));

@@ -7,5 +7,6 @@ mod floors;
 mod frozen_lake;
 mod golden;
 mod parity;
+mod readme;
 mod shaping;
 mod support;

@@ -27,16 +27,16 @@ impl PolicyIteration {
             let q = q_from_v(mdp, self.gamma, &v);
             let scale = v.iter().fold(1.0f64, |m, x| m.max(x.abs()));
             let mut improved = false;
-            for s in 0..mdp.n_states() {
+            for (s, current) in policy.iter_mut().enumerate() {
                 let row = q.row(s);
-                let mut best = policy[s];
+                let mut best = *current;
                 for a in 0..row.len() {
                     if row[a] > row[best] + 1e-12 * scale {
                         best = a;
                     }
                 }
-                improved |= best != policy[s];
-                policy[s] = best;
+                improved |= best != *current;
+                *current = best;
             }
             if !improved {
                 return Ok(q);
