@@ -50,13 +50,13 @@ const MEMORY: &str = "writing to a string does not fail";
 fn describe(plan: &Plan) -> String {
     let mut text = String::new();
     let units: usize = plan.variants.iter().map(|v| v.seeds.0.len()).sum();
-    let s = if plan.variants.len() == 1 { "" } else { "s" };
     writeln!(
         text,
-        "{}: study \"{}\", {} variant{s}, {units} units",
+        "{}: study \"{}\", {}, {}",
         plan.sources.script.name,
         plan.name,
-        plan.variants.len()
+        counted(plan.variants.len(), "variant"),
+        counted(units, "unit"),
     )
     .expect(MEMORY);
     for variant in &plan.variants {
@@ -85,14 +85,19 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
         DiscretiserSpec::Bins(dims) => {
             let sizes: Vec<String> = dims.iter().map(|d| d.n.to_string()).collect();
             let cells: usize = dims.iter().map(|d| d.n).product();
-            rows.push(("discretiser", format!("{} bins = {cells} cells", sizes.join(" × "))));
+            // The random agent's single cell is no discretiser of the user's.
+            if cells > 1 {
+                rows.push(("discretiser", format!("{} bins = {cells} cells", sizes.join(" × "))));
+            }
         }
         DiscretiserSpec::Cells { shape, cell } => {
             let cells: usize = shape.iter().product();
             rows.push(("discretiser", format!("{}, {cells} cells", at(cell))));
         }
     }
-    rows.push(("training", format!("{} seeds × {} episodes {limit}", v.seeds.0.len(), v.episodes)));
+    let seeds = counted(v.seeds.0.len(), "seed");
+    let episodes = counted(v.episodes as usize, "episode");
+    rows.push(("training", format!("{seeds} × {episodes} {limit}")));
     if let Some(potential) = &v.potential {
         let on = match (&v.discretiser, v.potential_on) {
             (DiscretiserSpec::StateIndex, _) => "tabulated over the states",
@@ -108,6 +113,11 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
         rows.push(("term", format!("{name}: {}", at(term))));
     }
     rows
+}
+
+/// `1 seed`, `20 seeds`.
+fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 fn at(callback: &Callback) -> String {

@@ -61,6 +61,12 @@ impl Results {
     /// Never: the manifest is plain data.
     pub fn open(folder: &Path, plan: &Plan, jobs: usize, fresh: bool) -> Result<Self, FolderError> {
         owned_by(folder, plan)?;
+        if let Some(name) = plan.sources.imports.keys().find(|name| is_ours(name)) {
+            return Err(FolderError {
+                message: format!("the imported file `{name}` has the name of one of the results"),
+                hint: Some("call it something else, or put it into a folder".into()),
+            });
+        }
         std::fs::create_dir_all(folder).map_err(|e| FolderError {
             message: format!("{}: cannot be made: {e}", folder.display()),
             hint: Some("choose another place with --out DIR".into()),
@@ -234,6 +240,20 @@ fn owned_by(folder: &Path, plan: &Plan) -> Result<(), FolderError> {
         )),
         Err(e) => refuse(format!("study.json is not a manifest ({e})")),
     }
+}
+
+/// Whether an import, copied beside the script, would overwrite a file of the results.
+fn is_ours(path: &str) -> bool {
+    const FILES: [&str; 7] = [
+        "study.json",
+        "script.rhai",
+        "episodes.csv",
+        "summary.json",
+        "summary.csv",
+        "curves.svg",
+        "timing.json",
+    ];
+    FILES.contains(&path) || path.starts_with("units/")
 }
 
 fn term_names(plan: &Plan) -> Vec<&str> {
