@@ -10,3 +10,4 @@ mod parity;
 mod readme;
 mod shaping;
 mod support;
+mod wiewiora;
