@@ -148,10 +148,14 @@ impl ExperimentDraft {
                 let value = draft.ok_or_else(|| wrong(key, "bins(..) or cells(..)", value))?;
                 self.discretiser = Some(Located { value, spot: spot(key) });
             }
-            "episodes" => self.episodes = Some(whole(key, value, 1, 100_000_000)? as u32),
+            "episodes" => {
+                self.episodes = Some(whole(&format!("`{key}`"), value, 1, 100_000_000)? as u32)
+            }
             "seeds" => self.seeds = Some(seeds(value)?),
-            "max_steps" => self.max_steps = Some(whole(key, value, 0, 1_000_000_000)? as u32),
-            "window" => self.window = Some(whole(key, value, 1, 1_000_000)? as u32),
+            "max_steps" => {
+                self.max_steps = Some(whole(&format!("`{key}`"), value, 0, 1_000_000_000)? as u32)
+            }
+            "window" => self.window = Some(whole(&format!("`{key}`"), value, 1, 1_000_000)? as u32),
             "threshold" if removed => self.threshold = None,
             "threshold" => {
                 let finite = number(value).filter(|x| x.is_finite());
@@ -213,9 +217,12 @@ impl ExperimentDraft {
         } else if let (Some(map), Some(agent)) = (value.read_lock::<Map>(), self.agent.as_mut()) {
             merge_agent(&mut agent.value, &map, |key| spot(&format!("agent.{key}")))?;
         } else {
-            let names = crate::learn::registry::AGENTS.iter().map(|a| a.name);
-            return Err(wrong("agent", "an agent", value)
-                .hint(format!("one of: {}", names.collect::<Vec<_>>().join(", "))));
+            let names: Vec<&str> = crate::learn::registry::AGENTS.iter().map(|a| a.name).collect();
+            let hint = match text(value).filter(|name| names.contains(&name.as_str())) {
+                Some(name) => format!("write `{name}(#{{ .. }})`, without quotes"),
+                None => format!("one of: {}", names.join(", ")),
+            };
+            return Err(wrong("agent", "an agent", value).hint(hint));
         }
         Ok(())
     }

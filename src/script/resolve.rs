@@ -36,8 +36,13 @@ pub(super) fn plan(
     let mut variants: Vec<Variant> = Vec::with_capacity(study.experiments.len());
     for draft in &study.experiments {
         let variant = resolver.variant(draft, &mut warnings)?;
-        if variants.iter().any(|v| v.name == variant.name) {
-            let place = draft.name.as_ref().map_or(draft.spot.place(), |n| n.spot.place());
+        if let Some(i) = variants.iter().position(|v| v.name == variant.name) {
+            // A name that both have from the same place is inherited: the mistake is where the
+            // second one comes to be.
+            let name_place = |d: &ExperimentDraft| d.name.as_ref().and_then(|n| n.spot.place());
+            let place = name_place(draft)
+                .filter(|place| name_place(&study.experiments[i]).as_ref() != Some(place))
+                .or_else(|| draft.spot.place());
             return Err(Diagnostic::error(format!("two variants are called `{}`", variant.name))
                 .at(place)
                 .hint("give each a `name` of its own"));
@@ -119,12 +124,11 @@ impl Resolver<'_> {
         }
         if potential.is_some()
             && !draft.potential_raw
-            && let DiscretiserSpec::Cells { cell, .. } = &discretiser
+            && matches!(discretiser, DiscretiserSpec::Cells { .. })
         {
-            return Err(Diagnostic::error(format!(
-                "scripted cells (`{}`) have no representative to evaluate the potential on",
-                cell.label
-            ))
+            return Err(Diagnostic::error(
+                "scripted cells have no representative to evaluate the potential on",
+            )
             .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
             .hint("use bins(..), or say `potential_on: \"raw\"`"));
         }
@@ -249,7 +253,8 @@ impl Resolver<'_> {
             let given = arities[0].saturating_sub(captures.len());
             let s = if given == 1 { "" } else { "s" };
             return fail(Diagnostic::error(format!(
-                "`{label}` takes {given} argument{s}; here a function {signature} is expected"
+                "{} takes {given} argument{s}; here a function {signature} is expected",
+                if is_closure { "this closure".to_string() } else { format!("`{label}`") }
             )));
         }
         let digest = self.digest(name, &captures);
@@ -361,7 +366,8 @@ fn dims(bins: &[BinDraft], schema: &Schema, spec: &EnvSpec) -> Result<Vec<Dim>, 
             Err(i) if *i < schema.fields.len() => *i,
             Err(i) => {
                 return Err(Diagnostic::error(format!(
-                    "bin number {i} is one too many: the state of {} has {} fields",
+                    "bin number {} is one too many: the state of {} has {} fields",
+                    i + 1,
                     spec.id,
                     schema.fields.len()
                 ))
@@ -379,8 +385,9 @@ fn dims(bins: &[BinDraft], schema: &Schema, spec: &EnvSpec) -> Result<Vec<Dim>, 
 /// Bins to suggest: every field, over its declared range or, where that is infinite, ±3.
 fn example_bins(schema: &Schema) -> String {
     let fields = schema.fields.iter().map(|f| {
-        let lo = if f.low.is_finite() { f.low } else { -3.0 };
-        let hi = if f.high.is_finite() { f.high } else { 3.0 };
+        // Bounds are single-precision numbers: as such they are short.
+        let lo = if f.low.is_finite() { f.low as f32 } else { -3.0 };
+        let hi = if f.high.is_finite() { f.high as f32 } else { 3.0 };
         format!("{}: [{lo:?}, {hi:?}, 12]", f.name)
     });
     format!("bins(#{{ {} }})", fields.collect::<Vec<_>>().join(", "))

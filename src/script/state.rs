@@ -124,6 +124,9 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
         step_read.set(true);
         t.step
     });
+    engine.register_indexer_set(|_: &mut StepView, name: &str, _: Dynamic| {
+        fail::<()>(Diagnostic::error(format!("steps are read-only: `{name}` cannot be assigned")))
+    });
     engine.register_indexer_get(|_: &mut StepView, name: &str| {
         let diagnostic = Diagnostic::error(format!("a step has no field `{name}`"));
         fail::<Dynamic>(diagnostic.maybe_hint(suggest(name, STEP_FIELDS)))

@@ -19,8 +19,10 @@ pub(super) struct Syntax {
     pub(super) variables: Vec<String>,
     /// Imports at the top level: (path, alias), where the path is a literal.
     pub(super) imports: Vec<(String, String)>,
+    /// Names and numbers of parameters of the functions, closures left out.
+    pub(super) functions: Vec<(String, usize)>,
     /// By the position of a call: the keys of the map literals among its arguments, as dotted
-    /// paths, and their positions.
+    /// paths, and their positions; the items of array literals count as keys `0`, `1`, ….
     pub(super) keys: BTreeMap<At, BTreeMap<String, At>>,
     /// By the position of a call: where its arguments start.
     pub(super) args: BTreeMap<At, Vec<At>>,
@@ -36,6 +38,9 @@ impl Syntax {
     /// Reads the tree of one file.
     pub(super) fn of(ast: &AST) -> Self {
         let mut syntax = Self::default();
+        for f in ast.iter_functions().filter(|f| !f.name.starts_with("anon$")) {
+            syntax.functions.push((f.name.to_string(), f.params.len()));
+        }
         for stmt in ast.statements() {
             match stmt {
                 Stmt::Var(x, flags, _) if flags.intersects(ASTFlags::CONSTANT) => {
@@ -66,6 +71,19 @@ impl Syntax {
             true
         });
         syntax
+    }
+
+    /// Where the function `name` begins, given the file's text: a closure's first `|`, or the
+    /// name after `fn`.
+    pub(super) fn definition(&self, text: &str, name: &str) -> Option<At> {
+        if let Some(&at) = self.closures.get(name) {
+            return Some(at);
+        }
+        let tokens = tokens(text);
+        let start = tokens.windows(2).find(|t| t[0].text == "fn" && t[1].text == name)?[1].start;
+        let before = &text[..start];
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
     }
 
     fn call(&mut self, call: &FnCallExpr, pos: At) {
@@ -100,10 +118,17 @@ impl Syntax {
 /// Collects the keys of a map literal and of those nested in it, also through calls such as
 /// `q_learning(#{ … })`, whose keys belong to the key that holds the call.
 fn map_keys(expr: &Expr, prefix: &str, keys: &mut BTreeMap<String, At>) {
+    let join = |name: &str| {
+        if prefix.is_empty() { name.to_string() } else { format!("{prefix}.{name}") }
+    };
+    if let Expr::Array(items, _) = expr {
+        for (i, item) in items.iter().enumerate() {
+            keys.insert(join(&i.to_string()), at(item.start_position()));
+        }
+    }
     let Expr::Map(entries, _) = expr else { return };
     for (key, value) in &entries.0 {
-        let path =
-            if prefix.is_empty() { key.name.to_string() } else { format!("{prefix}.{}", key.name) };
+        let path = join(&key.name);
         map_keys(value, &path, keys);
         keys.insert(path, at(key.pos));
     }

@@ -2,3 +2,4 @@
 
 mod env;
 mod parity;
+mod scripts;
