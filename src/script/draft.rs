@@ -10,6 +10,7 @@ use super::diagnostic::{Diagnostic, Place, suggest};
 use super::keys;
 use super::params::{json, merge_agent, number, show, text, whole};
 use super::plan::GoldenBudget;
+use super::value::MAX_DEPTH;
 use crate::learn::ParamValue;
 use crate::learn::registry::AgentSpec;
 
@@ -108,13 +109,41 @@ fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagno
         .ok_or_else(|| wrong(key, &format!("a function {signature}"), value))
 }
 
-/// Gives a closure its own copy of what it captured. Rhai's closures share their variables: those
-/// made in a loop would all see the loop variable's last value.
+/// Gives a closure its own copy of what it captured, and of what that captured in turn. Rhai's
+/// closures share their variables: those made in a loop would all see the loop variable's last
+/// value.
 pub(super) fn captured_now(mut f: FnPtr) -> FnPtr {
-    for value in f.iter_curry_mut() {
-        *value = value.clone().flatten();
-    }
+    detach(&mut f, 0);
     f
+}
+
+/// Deeper values than this are left as they are; freezing refuses them.
+fn detach(f: &mut FnPtr, depth: usize) {
+    for value in f.iter_curry_mut() {
+        *value = detached(value, depth + 1);
+    }
+}
+
+fn detached(value: &Dynamic, depth: usize) -> Dynamic {
+    let value = value.clone().flatten();
+    if depth > MAX_DEPTH {
+        return value;
+    }
+    if let Some(mut f) = value.clone().try_cast::<FnPtr>() {
+        detach(&mut f, depth);
+        return f.into();
+    }
+    if let Some(array) = value.read_lock::<rhai::Array>() {
+        return array.iter().map(|v| detached(v, depth + 1)).collect::<rhai::Array>().into();
+    }
+    if let Some(map) = value.read_lock::<Map>() {
+        return map
+            .iter()
+            .map(|(k, v)| (k.clone(), detached(v, depth + 1)))
+            .collect::<Map>()
+            .into();
+    }
+    value
 }
 
 impl ExperimentDraft {

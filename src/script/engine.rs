@@ -108,7 +108,7 @@ fn limits(engine: &mut Engine) {
     engine.set_max_variables(512);
     engine.set_max_modules(64);
     engine.set_max_string_size(64 * 1024);
-    engine.set_max_array_size(65_536);
+    engine.set_max_array_size(16_384);
     engine.set_max_map_size(4_096);
     engine.set_max_strings_interned(4_096);
 }
@@ -135,7 +135,11 @@ fn constants_in_functions(engine: &mut Engine, context: &Rc<Context>) {
     let context = context.clone();
     #[expect(deprecated, reason = "`on_var` is marked volatile, not going away")]
     engine.on_var(move |name, index, runtime| {
-        if index > 0 || runtime.scope().contains(name) {
+        let local = runtime.scope().get(name);
+        if local.is_some_and(sandbox::too_deep) {
+            return sandbox::nested();
+        }
+        if index > 0 || local.is_some() {
             return Ok(None);
         }
         // While the top level runs, and inside imported modules: the file's own constants so far.

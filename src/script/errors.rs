@@ -198,6 +198,9 @@ fn not_found(context: &Context, signature: &str) -> Diagnostic {
     if !bare.starts_with(|c: char| c.is_alphabetic() || c == '_') {
         return Diagnostic::error(format!("`{name}` cannot be applied to ({args})"));
     }
+    if MATHEMATICAL.contains(&name) {
+        return Diagnostic::error(format!("`{name}` cannot be called with ({args})"));
+    }
     let syntax = context.syntax.borrow();
     let own: Vec<&(String, usize)> = syntax.values().flat_map(|s| &s.functions).collect();
     let mut arities: Vec<usize> =

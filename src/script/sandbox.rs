@@ -3,7 +3,7 @@
 
 use std::rc::Rc;
 
-use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, ImmutableString, Position};
+use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, ImmutableString, Map, Position};
 
 use super::diagnostic::Diagnostic;
 use super::engine::Context;
@@ -30,6 +30,46 @@ fn operations(engine: &mut Engine, context: &Rc<Context>) {
         context.operations.set(n);
         (n > context.max_operations.get()).then_some(Dynamic::UNIT)
     });
+}
+
+/// Closures in closures that a variable may hold, and values one may have captured by `curry`.
+const MAX_NESTING: usize = 32;
+/// Values that are looked at to find out.
+const MAX_LOOKED_AT: usize = 10_000;
+
+/// Whether a variable holds a closure around closures around …: they are dropped by recursion,
+/// and 100,000 of them overflow the stack, which nothing can catch.
+pub(super) fn too_deep(value: &Dynamic) -> bool {
+    fn deep(value: &Dynamic, depth: usize, budget: &mut usize) -> bool {
+        if depth > MAX_NESTING {
+            return true;
+        }
+        if *budget == 0 {
+            return false;
+        }
+        *budget -= 1;
+        if let Some(f) = value.read_lock::<FnPtr>() {
+            return f.iter_curry().count() > MAX_NESTING
+                || f.iter_curry().any(|v| deep(v, depth + 1, budget));
+        }
+        if let Some(array) = value.read_lock::<Array>() {
+            return array.iter().any(|v| deep(v, depth + 1, budget));
+        }
+        if let Some(map) = value.read_lock::<Map>() {
+            return map.values().any(|v| deep(v, depth + 1, budget));
+        }
+        false
+    }
+    // Only closures are looked into: arrays and maps have limits of their own, and may be large.
+    value.read_lock::<FnPtr>().is_some() && deep(value, 0, &mut { MAX_LOOKED_AT })
+}
+
+/// The error about it.
+pub(super) fn nested<T>() -> Fallible<T> {
+    fail(
+        Diagnostic::error(format!("closures are nested more than {MAX_NESTING} deep"))
+            .hint("does one capture itself, again and again?"),
+    )
 }
 
 fn no_clock(engine: &mut Engine) {

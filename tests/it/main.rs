@@ -1,5 +1,7 @@
 //! Integration tests: one binary, one module a subject.
 
 mod env;
+mod language;
 mod parity;
 mod scripts;
+mod unreadable;
