@@ -175,6 +175,12 @@ pub(super) fn compile(
     let mut ast = engine.compile(text).map_err(parse_error)?;
     ast.set_source(name);
     let syntax = Syntax::of(&ast);
+    if let Some((line, column)) = syntax.misplaced_import {
+        let place = Place { file: name.into(), line, column };
+        let d = Diagnostic::error("an import stands at the top level, with its path as a string")
+            .hint("put `import \"file\" as name;` at the top of the script");
+        return Err(context.sources.borrow().annotate(d.at(Some(place))));
+    }
     // A second, strict pass only checks names. It must know the constants, which functions see
     // here, and every function, which may be named before it is defined.
     let mut known = Scope::new();

@@ -191,15 +191,15 @@ fn not_found(context: &Context, signature: &str) -> Diagnostic {
     let args = types.join(", ");
     let bare = name.rsplit("::").next().unwrap_or(name);
     let all = functions();
+    if MATHEMATICAL.contains(&name) {
+        return Diagnostic::error(format!("`{name}` cannot be called with ({args})"));
+    }
     if let Some(known) = all.iter().find(|f| f.name == name) {
         return Diagnostic::error(format!("`{name}` cannot be called with ({args})"))
             .hint(format!("it is called as {}", known.signature));
     }
     if !bare.starts_with(|c: char| c.is_alphabetic() || c == '_') {
         return Diagnostic::error(format!("`{name}` cannot be applied to ({args})"));
-    }
-    if MATHEMATICAL.contains(&name) {
-        return Diagnostic::error(format!("`{name}` cannot be called with ({args})"));
     }
     let syntax = context.syntax.borrow();
     let own: Vec<&(String, usize)> = syntax.values().flat_map(|s| &s.functions).collect();

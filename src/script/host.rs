@@ -98,7 +98,8 @@ impl Host {
         let script = plan.sources.script.clone();
         let ast = compile(&engine, &context, &script.name, &script.text)?;
         let imports = context.syntax.borrow()[&*script.name].imports.clone();
-        for (path, alias) in imports {
+        // Without an alias, an import only runs the file's top level.
+        for (path, alias) in imports.into_iter().filter(|(_, alias)| !alias.is_empty()) {
             // Functions find imported modules by their alias; the import statement itself, which
             // belongs to the top level, does not run here.
             let line = format!("import {path:?} as {alias};");

@@ -257,13 +257,19 @@ impl Resolver<'_> {
                 if is_closure { "this closure".to_string() } else { format!("`{label}`") }
             )));
         }
-        let digest = self.digest(name, &captures);
+        let digest = self.digest(name, &captures, &mut Vec::new());
         Ok(Callback { function: name.to_string(), captures, label, place, digest })
     }
 
     /// Hashes everything that can change the function's results. Reachability goes by names, which
     /// errs on the side of too much.
-    fn digest(&self, function: &str, captures: &[Value]) -> String {
+    /// `within` names the functions whose digests are being made: a constant may hold a function
+    /// that uses that constant.
+    fn digest(&self, function: &str, captures: &[Value], within: &mut Vec<String>) -> String {
+        if let Some(level) = within.iter().position(|name| name == function) {
+            return format!("recursion {level}");
+        }
+        within.push(function.to_string());
         let script = self.host.context.sources.borrow().script.clone();
         let syntax = self.host.context.syntax.borrow();
         let syntax = &syntax[&*script.name];
@@ -292,7 +298,7 @@ impl Resolver<'_> {
             parts.insert(format!("{} {text}", if is_entry { "entry" } else { "function" }));
         }
         for (name, value) in self.constants.iter().filter(|(name, _)| used.contains(*name)) {
-            parts.insert(format!("const {name} = {}", self.canonical(value)));
+            parts.insert(format!("const {name} = {}", self.canonical(value, within)));
         }
         if syntax.imports.iter().any(|(_, alias)| used.contains(alias)) {
             for (path, source) in &self.host.context.sources.borrow().imports {
@@ -302,8 +308,9 @@ impl Resolver<'_> {
             }
         }
         for (i, value) in captures.iter().enumerate() {
-            parts.insert(format!("capture {i} = {}", self.canonical(value)));
+            parts.insert(format!("capture {i} = {}", self.canonical(value, within)));
         }
+        within.pop();
         let mut hash = Sha256::new();
         for part in parts {
             hash.update((part.len() as u64).to_le_bytes());
@@ -313,17 +320,18 @@ impl Resolver<'_> {
     }
 
     /// A value as text, with functions replaced by their digests (their names may be made up).
-    fn canonical(&self, value: &Value) -> String {
+    fn canonical(&self, value: &Value, within: &mut Vec<String>) -> String {
         match value {
-            Value::Fn { name, captures } => format!("fn {}", self.digest(name, captures)),
+            Value::Fn { name, captures } => format!("fn {}", self.digest(name, captures, within)),
             Value::Array(items) => {
                 format!(
                     "[{}]",
-                    items.iter().map(|v| self.canonical(v)).collect::<Vec<_>>().join(",")
+                    items.iter().map(|v| self.canonical(v, within)).collect::<Vec<_>>().join(",")
                 )
             }
             Value::Map(entries) => {
-                let entries = entries.iter().map(|(k, v)| format!("{k:?}:{}", self.canonical(v)));
+                let entries =
+                    entries.iter().map(|(k, v)| format!("{k:?}:{}", self.canonical(v, within)));
                 format!("{{{}}}", entries.collect::<Vec<_>>().join(","))
             }
             Value::Float(x) => format!("{:016x}", x.to_bits()),

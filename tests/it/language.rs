@@ -503,3 +503,31 @@ fn plans_are_the_same_on_every_thread() {
     let there = std::thread::spawn(move || loaded()).join().unwrap();
     assert_eq!(here, there);
 }
+
+#[test]
+fn constants_may_hold_functions_that_use_them() {
+    let recursive = "const G = g; fn g(n) { if n > 0 { G.call(n - 1) + 1 } else { 0 } }";
+    assert_eq!(value(recursive, "G.call(3)"), 3.0);
+    let of = |step: &str| {
+        let head = recursive.replace("+ 1", step);
+        digest(&format!("{head} fn f(s) {{ G.call(s.row) }} {LAKE}"), &[])
+    };
+    assert_eq!(of("+ 1"), of("+  1"));
+    assert_ne!(of("+ 1"), of("+ 2"));
+}
+
+#[test]
+fn typed_methods_reach_the_digest() {
+    let of = |body: &str| {
+        digest(&format!("fn int.twice() {{ {body} }} fn f(s) {{ s.row.twice() }} {LAKE}"), &[])
+    };
+    assert_ne!(of("this * 2"), of("this + this"));
+    assert_eq!(on_state("fn int.twice() { this * 2 }", "s.row.twice()"), 2.0);
+}
+
+#[test]
+fn an_import_without_a_name_only_runs() {
+    let script = format!("import \"lib\"; fn f(s) {{ s.row }} {LAKE}");
+    let plan = plan_of(&script, &[("lib.rhai", "print(\"here\"); 1")]);
+    assert_eq!((phi_at(&plan, 0, 2, 0), plan.printed), (2.0, vec!["here".to_string()]));
+}
