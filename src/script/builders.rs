@@ -223,6 +223,7 @@ fn agent(engine: &mut Engine, context: &Rc<Context>, spec: &'static AgentSpec) {
 }
 
 fn schedules(engine: &mut Engine, context: &Rc<Context>) {
+    type D = Dynamic;
     let c = context.clone();
     engine.register_fn("constant", move |native: NativeCallContext, value: Dynamic| {
         let call = Call::new(&c, &native);
@@ -257,7 +258,6 @@ fn schedules(engine: &mut Engine, context: &Rc<Context>) {
             })
         })())
     };
-    type D = Dynamic;
     let c = context.clone();
     engine.register_fn("linear", move |n: NativeCallContext, a: D, b: D, over: D| {
         linear(&Call::new(&c, &n), [a, b, over], &Map::new())

@@ -178,11 +178,11 @@ impl ExperimentDraft {
                 self.discretiser = Some(Located { value, spot: spot(key) });
             }
             "episodes" => {
-                self.episodes = Some(whole(&format!("`{key}`"), value, 1, 100_000_000)? as u32)
+                self.episodes = Some(whole(&format!("`{key}`"), value, 1, 100_000_000)? as u32);
             }
             "seeds" => self.seeds = Some(seeds(value)?),
             "max_steps" => {
-                self.max_steps = Some(whole(&format!("`{key}`"), value, 0, 1_000_000_000)? as u32)
+                self.max_steps = Some(whole(&format!("`{key}`"), value, 0, 1_000_000_000)? as u32);
             }
             "window" => self.window = Some(whole(&format!("`{key}`"), value, 1, 1_000_000)? as u32),
             "threshold" if removed => self.threshold = None,
@@ -340,8 +340,8 @@ fn seeds(value: &Dynamic) -> Result<Vec<u64>, Diagnostic> {
             seeds.filter(|s| !s.is_empty()).ok_or_else(|| wrong("seeds", expected, value))?;
         let mut sorted = seeds.clone();
         sorted.sort_unstable();
-        if let Some(pair) = sorted.windows(2).find(|w| w[0] == w[1]) {
-            return Err(Diagnostic::error(format!("seed {} is listed twice", pair[0])));
+        if let Some([seed, _]) = sorted.array_windows().find(|[a, b]| a == b) {
+            return Err(Diagnostic::error(format!("seed {seed} is listed twice")));
         }
         return Ok(seeds);
     }

@@ -17,8 +17,10 @@ fn arithmetic<T>(message: &str) -> Fallible<T> {
     Err(Box::new(EvalAltResult::ErrorArithmetic(message.into(), Position::NONE)))
 }
 
+type Unary = fn(f64) -> f64;
+
 /// Functions of one float that are registered under their own names, for integers as well.
-const UNARY: &[(&str, fn(f64) -> f64)] = &[
+const UNARY: &[(&str, Unary)] = &[
     ("sin", math::sin),
     ("cos", math::cos),
     ("tan", math::tan),

@@ -179,15 +179,11 @@ fn closure<'a>(tokens: &[Token<'a>]) -> Vec<Token<'a>> {
     for (i, t) in body.iter().enumerate() {
         match t.text {
             "(" | "[" | "{" => depth += 1,
-            ")" | "]" | "}" if depth == 0 => {
+            ")" | "]" | "}" | "," | ";" if depth == 0 => {
                 end = i;
                 break;
             }
             ")" | "]" | "}" => depth -= 1,
-            "," | ";" if depth == 0 => {
-                end = i;
-                break;
-            }
             _ => {}
         }
     }

@@ -2,6 +2,7 @@
 
 mod env;
 mod language;
+mod numbers;
 mod parity;
 mod scripts;
 mod unreadable;
