@@ -1,9 +1,13 @@
 //! Numbers in scripts: comparisons, arithmetic and mathematics, at plan time and in callbacks.
 
+use std::fmt::Write as _;
+
 use runner::mdp::math;
 use runner::script::Host;
 
 use crate::language::{LAKE, holds, plan_of, potential, value};
+
+type Unary = fn(f64) -> f64;
 
 #[test]
 fn comparisons_are_ieee() {
@@ -126,7 +130,7 @@ fn integers_are_checked() {
 #[test]
 fn mathematics_is_pinned_bit_for_bit() {
     let xs = [0.1, 0.7, 1.3, 2.9, -0.4, 1e-9, 12.34, 355.0 / 113.0];
-    let unary: &[(&str, fn(f64) -> f64)] = &[
+    let unary: &[(&str, Unary)] = &[
         ("sin", math::sin),
         ("cos", math::cos),
         ("tan", math::tan),
@@ -150,15 +154,15 @@ fn mathematics_is_pinned_bit_for_bit() {
     let mut expected = Vec::new();
     for (name, f) in unary {
         for x in xs.iter().copied().filter(|x| f(*x).is_finite()) {
-            body.push_str(&format!("print({name}({x:?})); print(({x:?}).{name}());"));
+            write!(body, "print({name}({x:?})); print(({x:?}).{name}());").unwrap();
             expected.extend([f(x), f(x)]);
         }
     }
     for (x, y) in [(1.1, 2.3), (0.3, 0.7), (7.7, 1.5), (2.0, 0.5)] {
-        body.push_str(&format!(
+        write!(body, 
             "print({x:?} ** {y:?}); print(pow({x:?}, {y:?})); print(atan({x:?}, {y:?})); print(hypot({x:?}, {y:?})); print(log({x:?}, {y:?}));\
              let z = {x:?}; z **= {y:?}; print(z); print({x:?} ** 3); print(pow({x:?}, 3));"
-        ));
+        ).unwrap();
         let cube = math::pow_int(x, 3);
         let power = math::pow(x, y);
         expected.extend([
@@ -173,7 +177,7 @@ fn mathematics_is_pinned_bit_for_bit() {
         ]);
     }
     for (x, f) in [(2, math::sin as fn(f64) -> f64), (3, math::sin)] {
-        body.push_str(&format!("print(sin({x}));"));
+        write!(body, "print(sin({x}));").unwrap();
         expected.push(f(f64::from(x)));
     }
     let plan = plan_of(&format!("fn f(s) {{ 1 }} {body} {LAKE}"), &[]);

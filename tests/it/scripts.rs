@@ -23,7 +23,7 @@ fn expected(text: &str) -> String {
     let marks = ["Error:", "Warning:", "Hint:", "Note:"];
     let comments = text.lines().filter_map(|line| line.trim().strip_prefix("// "));
     let lines = comments.filter(|c| marks.iter().any(|mark| c.starts_with(mark)));
-    lines.map(|line| format!("{line}\n")).collect()
+    lines.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// A diagnostic in the form of the expectations.
@@ -89,5 +89,5 @@ fn wrong_scripts_are_told_what_is_wrong_with_them() {
 }
 
 fn indent(text: &str) -> String {
-    text.lines().map(|line| format!("    {line}\n")).collect()
+    text.lines().flat_map(|line| ["    ", line, "\n"]).collect()
 }
