@@ -322,7 +322,7 @@ fn plans_are_the_same_on_every_thread() {
     };
     let here = loaded();
     assert_eq!(here.len(), 5);
-    let there = std::thread::spawn(move || loaded()).join().unwrap();
+    let there = std::thread::spawn(loaded).join().unwrap();
     assert_eq!(here, there);
 }
 

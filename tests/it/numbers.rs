@@ -159,7 +159,7 @@ fn mathematics_is_pinned_bit_for_bit() {
         }
     }
     for (x, y) in [(1.1, 2.3), (0.3, 0.7), (7.7, 1.5), (2.0, 0.5)] {
-        write!(body, 
+        write!(body,
             "print({x:?} ** {y:?}); print(pow({x:?}, {y:?})); print(atan({x:?}, {y:?})); print(hypot({x:?}, {y:?})); print(log({x:?}, {y:?}));\
              let z = {x:?}; z **= {y:?}; print(z); print({x:?} ** 3); print(pow({x:?}, 3));"
         ).unwrap();
