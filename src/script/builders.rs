@@ -163,7 +163,8 @@ fn studies(engine: &mut Engine, context: &Rc<Context>) {
             let mut golden = GoldenBudget::default();
             for (key, value) in &map {
                 let n = call.finish(
-                    whole(key, value, 1, 1_000_000).map_err(|d| d.at(call.key(key).place())),
+                    whole(&format!("`{key}`"), value, 1, 1_000_000)
+                        .map_err(|d| d.at(call.key(key).place())),
                 )?;
                 match key.as_str() {
                     "episodes" => golden.episodes = Some(n as u32),
@@ -222,39 +223,41 @@ fn agent(engine: &mut Engine, context: &Rc<Context>, spec: &'static AgentSpec) {
 }
 
 fn schedules(engine: &mut Engine, context: &Rc<Context>) {
+    type D = Dynamic;
     let c = context.clone();
     engine.register_fn("constant", move |native: NativeCallContext, value: Dynamic| {
         let call = Call::new(&c, &native);
-        call.finish(finite("the value", &value).map(Schedule::constant))
+        call.finish(finite(&call, 0, "the value", &value).map(Schedule::constant))
     });
     let unit = |steps: bool| if steps { Unit::Step } else { Unit::Episode };
     let linear = move |call: &Call<'_>, [start, end, over]: [Dynamic; 3], options: &Map| {
         call.finish((|| {
             Ok(Schedule::Linear {
-                start: finite("the start", &start)?,
-                end: finite("the end", &end)?,
-                over: whole("the number of episodes or steps", &over, 1, i64::MAX)? as u64,
-                unit: unit(per_step(options)?),
+                start: finite(call, 0, "the start", &start)?,
+                end: finite(call, 1, "the end", &end)?,
+                over: whole("the number of episodes or steps", &over, 1, i64::MAX)
+                    .map_err(|d| d.at(call.arg(2).place()))? as u64,
+                unit: unit(per_step(options, |key| call.key(key))?),
             })
         })())
     };
     let exponential = move |call: &Call<'_>, [start, factor, min]: [Dynamic; 3], options: &Map| {
         call.finish((|| {
-            let factor = finite("the factor", &factor)?;
+            let factor = finite(call, 1, "the factor", &factor)?;
             if !(factor > 0.0 && factor <= 1.0) {
                 return Err(Diagnostic::error(format!(
                     "the factor of an exponential schedule is above 0 and at most 1, got {factor}"
-                )));
+                ))
+                .at(call.arg(1).place()));
             }
             Ok(Schedule::Exponential {
-                start: finite("the start", &start)?,
+                start: finite(call, 0, "the start", &start)?,
                 factor,
-                min: finite("the minimum", &min)?,
-                unit: unit(per_step(options)?),
+                min: finite(call, 2, "the minimum", &min)?,
+                unit: unit(per_step(options, |key| call.key(key))?),
             })
         })())
     };
-    type D = Dynamic;
     let c = context.clone();
     engine.register_fn("linear", move |n: NativeCallContext, a: D, b: D, over: D| {
         linear(&Call::new(&c, &n), [a, b, over], &Map::new())
@@ -276,9 +279,11 @@ fn schedules(engine: &mut Engine, context: &Rc<Context>) {
     );
 }
 
-fn finite(what: &str, value: &Dynamic) -> Result<f64, Diagnostic> {
+/// The `i`-th argument of a schedule, a finite number.
+fn finite(call: &Call<'_>, i: usize, what: &str, value: &Dynamic) -> Result<f64, Diagnostic> {
     number(value).filter(|x| x.is_finite()).ok_or_else(|| {
         Diagnostic::error(format!("{what} of a schedule is a number, got {}", show(value)))
+            .at(call.arg(i).place())
     })
 }
 
@@ -292,7 +297,8 @@ fn discretisers(engine: &mut Engine, context: &Rc<Context>) {
     let c = context.clone();
     engine.register_fn("bins", move |native: NativeCallContext, list: Array| {
         let call = Call::new(&c, &native);
-        let dims = list.iter().enumerate().map(|(i, value)| bin(Err(i), value, call.arg(0)));
+        let dims =
+            list.iter().enumerate().map(|(i, value)| bin(Err(i), value, call.key(&i.to_string())));
         call.finish(dims.collect::<Result<_, _>>().map(DiscretiserDraft::Bins))
     });
     let c = context.clone();
@@ -300,6 +306,7 @@ fn discretisers(engine: &mut Engine, context: &Rc<Context>) {
         let call = Call::new(&c, &native);
         call.finish(
             shape(&[n.into()])
+                .map_err(|d| d.at(call.arg(0).place()))
                 .map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
         )
     });
@@ -307,7 +314,9 @@ fn discretisers(engine: &mut Engine, context: &Rc<Context>) {
     engine.register_fn("cells", move |native: NativeCallContext, sizes: Array, cell: FnPtr| {
         let call = Call::new(&c, &native);
         call.finish(
-            shape(&sizes).map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
+            shape(&sizes)
+                .map_err(|d| d.at(call.arg(0).place()))
+                .map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
         )
     });
 }
@@ -315,7 +324,7 @@ fn discretisers(engine: &mut Engine, context: &Rc<Context>) {
 fn bin(field: Result<String, usize>, value: &Dynamic, spot: Spot) -> Result<BinDraft, Diagnostic> {
     let label = || match &field {
         Ok(name) => format!("`{name}`"),
-        Err(i) => format!("number {i}"),
+        Err(i) => format!("number {}", i + 1),
     };
     let wrong = || {
         Diagnostic::error(format!("bin {} is [lo, hi, n], got {}", label(), show(value)))

@@ -1,15 +1,13 @@
-//! Calling script functions while training, and turning Rhai's errors into diagnostics.
+//! Calling script functions while training.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use rhai::{
-    AST, CallFnOptions, Dynamic, Engine, EvalAltResult, FnPtr, ParseErrorType, Position, Scope,
-};
+use rhai::{AST, CallFnOptions, Dynamic, Engine, FnPtr, Scope};
 
-use super::diagnostic::{Diagnostic, nearest};
-use super::engine::{BUILT_IN_CONSTANTS, CALLBACK_OPERATIONS, Context};
-use super::functions::functions;
+use super::diagnostic::{Diagnostic, Place};
+use super::engine::{CALLBACK_OPERATIONS, Context};
+use super::errors::diagnostic;
 use super::params::show;
 use super::plan::Callback;
 use super::state::{State, StepView};
@@ -23,6 +21,12 @@ fn fault(diagnostic: Diagnostic) -> Fault {
     Fault(Box::new(diagnostic))
 }
 
+/// A callback, ready to be called.
+struct Prepared {
+    callback: Callback,
+    captures: Vec<Dynamic>,
+}
+
 /// One thread's compiled script, ready to be called.
 pub struct Callbacks {
     pub(super) engine: Engine,
@@ -34,6 +38,8 @@ pub struct Callbacks {
 impl Callbacks {
     pub(super) fn new(mut engine: Engine, ast: AST, context: Rc<Context>) -> Rc<Self> {
         engine.set_max_operations(CALLBACK_OPERATIONS);
+        context.operations.set(0);
+        context.max_operations.set(CALLBACK_OPERATIONS);
         Rc::new(Self { engine, ast, context, scope: RefCell::new(Scope::new()) })
     }
 
@@ -42,27 +48,38 @@ impl Callbacks {
         self.ast.iter_fn_def().find(|f| f.name == name).map(|f| FnPtr::from(f.clone()))
     }
 
-    /// Calls `callback` with `args` after its captured values.
-    pub(super) fn call(
-        &self,
-        callback: &Callback,
-        args: Vec<Dynamic>,
-    ) -> Result<Dynamic, Diagnostic> {
+    /// `callback` with its captured values turned back into the script's: once, not at every call.
+    fn prepare(&self, callback: &Callback) -> Prepared {
         let function = |name: &str| self.function(name);
-        let mut all: Vec<Dynamic> = callback.captures.iter().map(|v| v.thaw(&function)).collect();
-        all.extend(args);
+        let captures = callback.captures.iter().map(|v| v.thaw(&function)).collect();
+        Prepared { callback: callback.clone(), captures }
+    }
+
+    /// Calls `callback` with `arg` after its captured values, which it gets as copies: what it
+    /// does to them is forgotten.
+    fn call(&self, callback: &Prepared, arg: Dynamic) -> Result<Dynamic, Diagnostic> {
+        let mut args = Vec::with_capacity(callback.captures.len() + 1);
+        args.extend(callback.captures.iter().cloned());
+        args.push(arg);
         let options = CallFnOptions::new().eval_ast(false).rewind_scope(true);
         let mut scope = self.scope.borrow_mut();
-        let result = self.engine.call_fn_with_options::<Dynamic>(
-            options,
-            &mut scope,
-            &self.ast,
-            &callback.function,
-            all,
-        );
-        result.map_err(|e| {
-            self.annotate(diagnostic(&self.context, &e, None).at(callback.place.clone()))
-        })
+        let name = &callback.callback.function;
+        self.context.operations.set(0);
+        self.engine
+            .call_fn_with_options::<Dynamic>(options, &mut scope, &self.ast, name, args)
+            .map_err(|e| {
+                // A used-up budget or stack loses its place on the way out.
+                let place = self.definition(name).or_else(|| callback.callback.place.clone());
+                self.annotate(diagnostic(&self.context, &e, None).at(place))
+            })
+    }
+
+    /// Where the script defines the function `name`.
+    fn definition(&self, name: &str) -> Option<Place> {
+        let script = self.context.sources.borrow().script.clone();
+        let syntax = self.context.syntax.borrow();
+        let (line, column) = syntax.get(&*script.name)?.definition(&script.text, name)?;
+        Some(Place { file: script.name, line, column })
     }
 
     fn annotate(&self, diagnostic: Diagnostic) -> Diagnostic {
@@ -72,33 +89,36 @@ impl Callbacks {
     /// A call that must give a number.
     fn number(
         &self,
-        callback: &Callback,
+        callback: &Prepared,
         what: &str,
         arg: Dynamic,
         state: &State,
     ) -> Result<f64, Diagnostic> {
         let on = || format!("on the state {}", state.describe());
-        let result = self.call(callback, vec![arg]).map_err(|d| d.note(on()))?;
+        let result = self.call(callback, arg).map_err(|d| d.note(on()))?;
         let number = super::params::number(&result);
         match number {
             Some(x) if x.is_finite() => Ok(x),
             _ => {
                 let got = if result.is_unit() { "nothing: ()".into() } else { show(&result) };
                 let mut d = Diagnostic::error(format!(
-                    "{what} `{}` must return a finite number, it returned {got}",
-                    callback.label
+                    "{what} {} must return a finite number, it returned {got}",
+                    callback.callback.described()
                 ));
                 if result.is_unit() {
-                    d = d.hint("is the last line missing its value, or ended with a `;`?");
+                    d = d.hint(
+                        "a function's value is its last line's; an `if` without `else` has none",
+                    );
                 }
-                Err(self.annotate(d.at(callback.place.clone()).note(on())))
+                Err(self.annotate(d.at(callback.callback.place.clone()).note(on())))
             }
         }
     }
 
     /// `callback` as a potential of the state's fields.
     pub fn potential(self: &Rc<Self>, callback: &Callback, schema: &Schema) -> PhiFn {
-        let (host, callback, schema) = (self.clone(), callback.clone(), Rc::new(schema.clone()));
+        let (host, callback, schema) =
+            (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
         Box::new(move |fields| {
             let state = State::new(&schema, fields);
             let arg = Dynamic::from(state.clone());
@@ -108,14 +128,15 @@ impl Callbacks {
 
     /// `callback` as a discretiser into a table of the given shape.
     pub fn cells(self: &Rc<Self>, callback: &Callback, shape: &[usize], schema: &Schema) -> CellFn {
-        let (host, callback, schema) = (self.clone(), callback.clone(), Rc::new(schema.clone()));
+        let (host, callback, schema) =
+            (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
         let shape = shape.to_vec();
         Box::new(move |fields| {
             let state = State::new(&schema, fields);
-            let result = host.call(&callback, vec![Dynamic::from(state.clone())]);
+            let result = host.call(&callback, Dynamic::from(state.clone()));
             result
                 .and_then(|value| {
-                    cell_index(&value, &shape, &callback).map_err(|d| host.annotate(d))
+                    cell_index(&value, &shape, &callback.callback).map_err(|d| host.annotate(d))
                 })
                 .map_err(|d| fault(d.note(format!("on the state {}", state.describe()))))
         })
@@ -129,7 +150,8 @@ impl Callbacks {
         schema: &Schema,
     ) -> RewardFn<E> {
         let (host, schema) = (self.clone(), Rc::new(schema.clone()));
-        let (reward, terms) = (reward.cloned(), terms.to_vec());
+        let reward = reward.map(|callback| self.prepare(callback));
+        let terms: Vec<Prepared> = terms.iter().map(|callback| self.prepare(callback)).collect();
         let n_fields = schema.fields.len();
         Box::new(move |env, t, sums| {
             let view = |obs: &E::Obs| {
@@ -146,7 +168,7 @@ impl Callbacks {
                 truncated: t.truncated,
                 step: i64::from(t.step),
             };
-            let call = |callback: &Callback, what: &str| {
+            let call = |callback: &Prepared, what: &str| {
                 let arg = Dynamic::from(step.clone());
                 host.number(callback, what, arg, &step.state).map_err(|d| {
                     fault(d.note(format!(
@@ -185,7 +207,7 @@ impl Callbacks {
     /// # Errors
     /// If the claim cannot be evaluated, or is not true or false.
     pub fn holds(&self, claim: &Callback, results: &serde_json::Value) -> Result<bool, Diagnostic> {
-        let value = self.call(claim, vec![dynamic(results)])?;
+        let value = self.call(&self.prepare(claim), dynamic(results))?;
         value.as_bool().map_err(|_| {
             let d =
                 Diagnostic::error(format!("an expectation is true or false, got {}", show(&value)));
@@ -228,11 +250,11 @@ fn cell_index(value: &Dynamic, shape: &[usize], callback: &Callback) -> Result<u
         };
         return wrong(
             Diagnostic::error(format!(
-                "the discretiser `{}` must return {expected}, it returned {}",
-                callback.label,
+                "the discretiser {} must return {expected}, it returned {}",
+                callback.described(),
                 show(value)
             ))
-            .maybe_hint(value.is_float().then(|| "write to_int(x) or floor(x).to_int()".into())),
+            .maybe_hint(value.is_float().then(|| "write floor(x).to_int()".into())),
         );
     };
     let mut cell = 0;
@@ -241,124 +263,12 @@ fn cell_index(value: &Dynamic, shape: &[usize], callback: &Callback) -> Result<u
             Ok(i) if i < n => cell = cell * n + i,
             _ => {
                 return wrong(Diagnostic::error(format!(
-                    "the discretiser `{}` returned index {i}, outside its table of {n} (0 to {})",
-                    callback.label,
+                    "the discretiser {} returned index {i}, outside its table of {n} (0 to {})",
+                    callback.described(),
                     n - 1
                 )));
             }
         }
     }
     Ok(cell)
-}
-
-/// A syntax error as a diagnostic.
-pub(super) fn parse_diagnostic(
-    context: &Context,
-    source: &str,
-    error: &ParseErrorType,
-    position: Position,
-) -> Diagnostic {
-    let d = match error {
-        ParseErrorType::VariableUndefined(name) => {
-            let syntax = context.syntax.borrow();
-            let syntax = syntax.get(source);
-            let d = Diagnostic::error(format!("there is no variable or function `{name}` here"));
-            if syntax.is_some_and(|s| s.variables.contains(name)) {
-                d.hint(format!(
-                    "functions see constants only: write `const {name} = …`, or use a closure |s| …"
-                ))
-            } else {
-                let constants = syntax.map(|s| s.constants.clone()).unwrap_or_default();
-                let functions: Vec<&str> = functions().iter().map(|f| f.name).collect();
-                let known = constants.iter().map(String::as_str).chain(functions);
-                let best = nearest(name, known.chain(BUILT_IN_CONSTANTS.iter().copied()));
-                d.maybe_hint(best.map(|b| format!("did you mean `{b}`?")))
-            }
-        }
-        other => Diagnostic::error(lower_first(&other.to_string())),
-    };
-    let place = context.place(Some(source), position);
-    context.sources.borrow().annotate(d.at(place))
-}
-
-fn lower_first(text: &str) -> String {
-    let mut chars = text.chars();
-    match chars.next() {
-        Some(c) => c.to_lowercase().chain(chars).collect(),
-        None => String::new(),
-    }
-}
-
-/// A run-time error as a diagnostic, with the innermost place.
-pub(super) fn diagnostic(
-    context: &Context,
-    error: &EvalAltResult,
-    source: Option<&str>,
-) -> Diagnostic {
-    let mut error = error;
-    let mut source = source.map(str::to_string);
-    let mut place = None;
-    loop {
-        // The innermost position that is known wins; the source changes with the function.
-        place = context.place(source.as_deref(), error.position()).or(place);
-        match error {
-            EvalAltResult::ErrorInFunctionCall(_, file, inner, _) => {
-                if !file.is_empty() {
-                    source = Some(file.clone());
-                }
-                error = inner;
-            }
-            EvalAltResult::ErrorInModule(_, inner, _) => error = inner,
-            _ => break,
-        }
-    }
-    let d = match error {
-        EvalAltResult::ErrorRuntime(value, _) => match value.clone().try_cast::<Diagnostic>() {
-            Some(d) => d,
-            None => Diagnostic::error(format!("the script threw {}", show(value))),
-        },
-        EvalAltResult::ErrorParsing(error, position) => {
-            let file = source.unwrap_or_else(|| context.sources.borrow().script.name.to_string());
-            return parse_diagnostic(context, &file, error, *position);
-        }
-        EvalAltResult::ErrorFunctionNotFound(signature, _) => not_found(context, signature),
-        EvalAltResult::ErrorTooManyOperations(_) => {
-            Diagnostic::error("the operation budget is used up").hint("is this loop endless?")
-        }
-        EvalAltResult::ErrorStackOverflow(_) => Diagnostic::error("calls are nested too deeply")
-            .hint("does this function call itself without end?"),
-        EvalAltResult::ErrorVariableNotFound(name, _) => {
-            Diagnostic::error(format!("there is no variable `{name}` here"))
-        }
-        EvalAltResult::ErrorDotExpr(what, _) => {
-            Diagnostic::error(format!("no such property: {what}"))
-                .hint("numbers are floats or integers; is this value of the type you expect?")
-        }
-        other => {
-            let mut bare = String::new();
-            let text = other.to_string();
-            bare.push_str(text.split(" (line ").next().unwrap_or(&text));
-            Diagnostic::error(lower_first(&bare))
-        }
-    };
-    context.sources.borrow().annotate(d.at(place))
-}
-
-/// No function of that name takes those arguments.
-fn not_found(context: &Context, signature: &str) -> Diagnostic {
-    let (name, args) = signature.split_once(" (").unwrap_or((signature, ")"));
-    let args = args.trim_end_matches(')').replace("rhai::", "");
-    let all = functions();
-    if let Some(known) = all.iter().find(|f| f.name == name) {
-        return Diagnostic::error(format!("`{name}` cannot be called with ({args})"))
-            .hint(format!("it is called as {}", known.signature));
-    }
-    if !name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_') {
-        return Diagnostic::error(format!("`{name}` cannot be applied to ({args})"));
-    }
-    let syntax = context.syntax.borrow();
-    let _ = &syntax;
-    let best = nearest(name, all.iter().map(|f| f.name));
-    Diagnostic::error(format!("there is no function `{name}` that takes ({args})"))
-        .maybe_hint(best.map(|b| format!("did you mean `{b}`?")))
 }

@@ -34,9 +34,9 @@ pub struct Diagnostic {
     /// Where, if it has a place.
     pub place: Option<Place>,
     /// The source line at `place`.
-    pub source_line: Option<String>,
+    pub source_line: Option<Box<str>>,
     /// What to do about it.
-    pub hint: Option<String>,
+    pub hint: Option<Box<str>>,
     /// Further facts, for example the state on which a callback failed.
     pub notes: Vec<String>,
 }
@@ -71,7 +71,7 @@ impl Diagnostic {
     /// Adds what to do about it.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint = Some(hint.into());
+        self.hint = Some(hint.into().into());
         self
     }
 
@@ -79,7 +79,7 @@ impl Diagnostic {
     #[must_use]
     pub fn maybe_hint(mut self, hint: Option<String>) -> Self {
         if hint.is_some() {
-            self.hint = hint;
+            self.hint = hint.map(Into::into);
         }
         self
     }
@@ -112,7 +112,7 @@ impl Diagnostic {
             group = group.element(Level::NOTE.message(note.as_str()));
         }
         if let Some(hint) = &self.hint {
-            group = group.element(Level::HELP.message(hint.as_str()));
+            group = group.element(Level::HELP.message(&**hint));
         }
         let renderer = if colour { Renderer::styled() } else { Renderer::plain() };
         renderer.render(&[group])

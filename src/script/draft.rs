@@ -10,6 +10,7 @@ use super::diagnostic::{Diagnostic, Place, suggest};
 use super::keys;
 use super::params::{json, merge_agent, number, show, text, whole};
 use super::plan::GoldenBudget;
+use super::value::MAX_DEPTH;
 use crate::learn::ParamValue;
 use crate::learn::registry::AgentSpec;
 
@@ -108,13 +109,41 @@ fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagno
         .ok_or_else(|| wrong(key, &format!("a function {signature}"), value))
 }
 
-/// Gives a closure its own copy of what it captured. Rhai's closures share their variables: those
-/// made in a loop would all see the loop variable's last value.
+/// Gives a closure its own copy of what it captured, and of what that captured in turn. Rhai's
+/// closures share their variables: those made in a loop would all see the loop variable's last
+/// value.
 pub(super) fn captured_now(mut f: FnPtr) -> FnPtr {
-    for value in f.iter_curry_mut() {
-        *value = value.clone().flatten();
-    }
+    detach(&mut f, 0);
     f
+}
+
+/// Deeper values than this are left as they are; freezing refuses them.
+fn detach(f: &mut FnPtr, depth: usize) {
+    for value in f.iter_curry_mut() {
+        *value = detached(value, depth + 1);
+    }
+}
+
+fn detached(value: &Dynamic, depth: usize) -> Dynamic {
+    let value = value.clone().flatten();
+    if depth > MAX_DEPTH {
+        return value;
+    }
+    if let Some(mut f) = value.clone().try_cast::<FnPtr>() {
+        detach(&mut f, depth);
+        return f.into();
+    }
+    if let Some(array) = value.read_lock::<rhai::Array>() {
+        return array.iter().map(|v| detached(v, depth + 1)).collect::<rhai::Array>().into();
+    }
+    if let Some(map) = value.read_lock::<Map>() {
+        return map
+            .iter()
+            .map(|(k, v)| (k.clone(), detached(v, depth + 1)))
+            .collect::<Map>()
+            .into();
+    }
+    value
 }
 
 impl ExperimentDraft {
@@ -148,10 +177,14 @@ impl ExperimentDraft {
                 let value = draft.ok_or_else(|| wrong(key, "bins(..) or cells(..)", value))?;
                 self.discretiser = Some(Located { value, spot: spot(key) });
             }
-            "episodes" => self.episodes = Some(whole(key, value, 1, 100_000_000)? as u32),
+            "episodes" => {
+                self.episodes = Some(whole(&format!("`{key}`"), value, 1, 100_000_000)? as u32);
+            }
             "seeds" => self.seeds = Some(seeds(value)?),
-            "max_steps" => self.max_steps = Some(whole(key, value, 0, 1_000_000_000)? as u32),
-            "window" => self.window = Some(whole(key, value, 1, 1_000_000)? as u32),
+            "max_steps" => {
+                self.max_steps = Some(whole(&format!("`{key}`"), value, 0, 1_000_000_000)? as u32);
+            }
+            "window" => self.window = Some(whole(&format!("`{key}`"), value, 1, 1_000_000)? as u32),
             "threshold" if removed => self.threshold = None,
             "threshold" => {
                 let finite = number(value).filter(|x| x.is_finite());
@@ -213,9 +246,12 @@ impl ExperimentDraft {
         } else if let (Some(map), Some(agent)) = (value.read_lock::<Map>(), self.agent.as_mut()) {
             merge_agent(&mut agent.value, &map, |key| spot(&format!("agent.{key}")))?;
         } else {
-            let names = crate::learn::registry::AGENTS.iter().map(|a| a.name);
-            return Err(wrong("agent", "an agent", value)
-                .hint(format!("one of: {}", names.collect::<Vec<_>>().join(", "))));
+            let names: Vec<&str> = crate::learn::registry::AGENTS.iter().map(|a| a.name).collect();
+            let hint = match text(value).filter(|name| names.contains(&name.as_str())) {
+                Some(name) => format!("write `{name}(#{{ .. }})`, without quotes"),
+                None => format!("one of: {}", names.join(", ")),
+            };
+            return Err(wrong("agent", "an agent", value).hint(hint));
         }
         Ok(())
     }
@@ -304,8 +340,8 @@ fn seeds(value: &Dynamic) -> Result<Vec<u64>, Diagnostic> {
             seeds.filter(|s| !s.is_empty()).ok_or_else(|| wrong("seeds", expected, value))?;
         let mut sorted = seeds.clone();
         sorted.sort_unstable();
-        if let Some(pair) = sorted.windows(2).find(|w| w[0] == w[1]) {
-            return Err(Diagnostic::error(format!("seed {} is listed twice", pair[0])));
+        if let Some([seed, _]) = sorted.array_windows().find(|[a, b]| a == b) {
+            return Err(Diagnostic::error(format!("seed {seed} is listed twice")));
         }
         return Ok(seeds);
     }

@@ -13,7 +13,7 @@ use rhai::{
 use super::diagnostic::{Diagnostic, Place};
 use super::source::SourceSet;
 use super::syntax::Syntax;
-use super::{builders, numeric, state};
+use super::{builders, numeric, sandbox, state};
 
 /// Operations that building the plan may take: about two seconds.
 const PLAN_OPERATIONS: u64 = 20_000_000;
@@ -37,6 +37,11 @@ pub(super) struct Context {
     pub(super) printed: RefCell<Vec<String>>,
     /// Whether a callback has read `t.step` since this was last cleared.
     pub(super) step_read: Rc<Cell<bool>>,
+    /// Operations since the plan's building or a callback's call began. Rhai has a counter too,
+    /// but it loses what functions such as `filter` make their closures do.
+    pub(super) operations: Cell<u64>,
+    /// How many there may be.
+    pub(super) max_operations: Cell<u64>,
 }
 
 impl Context {
@@ -49,6 +54,8 @@ impl Context {
             loading: RefCell::default(),
             printed: RefCell::default(),
             step_read: Rc::default(),
+            operations: Cell::new(0),
+            max_operations: Cell::new(PLAN_OPERATIONS),
         })
     }
 
@@ -68,6 +75,7 @@ pub(super) fn engine(context: &Rc<Context>) -> Engine {
     let mut engine = Engine::new_raw();
     StandardPackage::new().register_into_engine(&mut engine);
     limits(&mut engine);
+    sandbox::register(&mut engine, context);
     numeric::register(&mut engine);
     state::register(&mut engine, context);
     builders::register(&mut engine, context);
@@ -100,7 +108,7 @@ fn limits(engine: &mut Engine) {
     engine.set_max_variables(512);
     engine.set_max_modules(64);
     engine.set_max_string_size(64 * 1024);
-    engine.set_max_array_size(65_536);
+    engine.set_max_array_size(16_384);
     engine.set_max_map_size(4_096);
     engine.set_max_strings_interned(4_096);
 }
@@ -127,7 +135,11 @@ fn constants_in_functions(engine: &mut Engine, context: &Rc<Context>) {
     let context = context.clone();
     #[expect(deprecated, reason = "`on_var` is marked volatile, not going away")]
     engine.on_var(move |name, index, runtime| {
-        if index > 0 || runtime.scope().contains(name) {
+        let local = runtime.scope().get(name);
+        if local.is_some_and(sandbox::too_deep) {
+            return sandbox::nested();
+        }
+        if index > 0 || local.is_some() {
             return Ok(None);
         }
         // While the top level runs, and inside imported modules: the file's own constants so far.
@@ -136,12 +148,14 @@ fn constants_in_functions(engine: &mut Engine, context: &Rc<Context>) {
         {
             return Ok(Some(value.clone()));
         }
-        Ok(match name {
+        // The script's own constants come before the built-in ones.
+        let own = context.constants.borrow().get(name).cloned();
+        Ok(own.or_else(|| match name {
             "PI" => Some(std::f64::consts::PI.into()),
             "E" => Some(std::f64::consts::E.into()),
             "INF" => Some(f64::INFINITY.into()),
-            _ => context.constants.borrow().get(name).cloned(),
-        })
+            _ => None,
+        }))
     });
 }
 
@@ -156,11 +170,17 @@ pub(super) fn compile(
     text: &str,
 ) -> Result<rhai::AST, Diagnostic> {
     let parse_error = |e: rhai::ParseError| {
-        super::callback::parse_diagnostic(context, name, e.err_type(), e.position())
+        super::errors::parse_diagnostic(context, name, e.err_type(), e.position())
     };
     let mut ast = engine.compile(text).map_err(parse_error)?;
     ast.set_source(name);
     let syntax = Syntax::of(&ast);
+    if let Some((line, column)) = syntax.misplaced_import {
+        let place = Place { file: name.into(), line, column };
+        let d = Diagnostic::error("an import stands at the top level, with its path as a string")
+            .hint("put `import \"file\" as name;` at the top of the script");
+        return Err(context.sources.borrow().annotate(d.at(Some(place))));
+    }
     // A second, strict pass only checks names. It must know the constants, which functions see
     // here, and every function, which may be named before it is defined.
     let mut known = Scope::new();
@@ -169,9 +189,12 @@ pub(super) fn compile(
     for name in constants.chain(functions.iter().map(String::as_str)) {
         known.push_constant(name, ());
     }
-    for name in BUILT_IN_CONSTANTS {
+    // A `let` of the same name hides a built-in constant at the top level; in functions, which do
+    // not see it, the name would silently mean something else.
+    for name in BUILT_IN_CONSTANTS.iter().filter(|n| syntax.variables.iter().all(|v| v != *n)) {
         known.push_constant(*name, ());
     }
+    context.syntax.borrow_mut().insert(name.to_string(), syntax);
     let strict = {
         let mut strict = Engine::new_raw();
         limits(&mut strict);
@@ -179,7 +202,6 @@ pub(super) fn compile(
         strict.set_optimization_level(rhai::OptimizationLevel::None);
         strict.compile_with_scope(&known, text)
     };
-    context.syntax.borrow_mut().insert(name.to_string(), syntax);
     strict.map_err(parse_error)?;
     Ok(ast)
 }
@@ -224,7 +246,7 @@ impl Imports {
         context.loading.borrow_mut().push(key.clone());
         let module = compile(engine, context, &source.name, &source.text).and_then(|ast| {
             Module::eval_ast_as_new(Scope::new(), &ast, engine)
-                .map_err(|e| super::callback::diagnostic(context, &e, Some(&source.name)))
+                .map_err(|e| super::errors::diagnostic(context, &e, Some(&source.name)))
         });
         context.loading.borrow_mut().pop();
         let module: Shared<Module> = module?.into();

@@ -63,6 +63,41 @@ const MATHEMATICS: &[(&str, &str, &str)] = &[
     ("is_nan", "is_nan(x), is_finite(x), is_infinite(x)", "tests"),
 ];
 
+/// Names among [`MATHEMATICS`], for suggestions.
+pub(super) const MATHEMATICAL: &[&str] = &[
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "asinh",
+    "acosh",
+    "atanh",
+    "exp",
+    "ln",
+    "log",
+    "sqrt",
+    "pow",
+    "hypot",
+    "abs",
+    "sign",
+    "min",
+    "max",
+    "clamp",
+    "floor",
+    "ceil",
+    "round",
+    "to_int",
+    "to_float",
+    "is_nan",
+    "is_finite",
+    "is_infinite",
+];
+
 /// Every function, builders first, then agents, then mathematics.
 pub fn functions() -> Vec<Function> {
     let plain = |list: &'static [(&'static str, &'static str, &'static str)]| {

@@ -7,10 +7,11 @@ use std::rc::Rc;
 use rhai::{Dynamic, Scope};
 
 use super::builders::experiments_of;
-use super::callback::{Callbacks, diagnostic};
+use super::callback::Callbacks;
 use super::diagnostic::Diagnostic;
 use super::draft::{ExperimentDraft, Spot, StudyDraft};
 use super::engine::{Context, compile, engine};
+use super::errors::diagnostic;
 use super::params::show;
 use super::plan::{GoldenBudget, Plan};
 use super::resolve;
@@ -77,7 +78,7 @@ fn study(value: Dynamic, name: &str) -> Result<StudyDraft, Diagnostic> {
         "a script ends in a study, an experiment or an array of experiments, this one in {}",
         if value.is_unit() { "nothing: ()".into() } else { show(&value) }
     ))
-    .hint("end the script with `study(\"name\", [experiment, …])`, without a `;` after it"))
+    .hint("let the last line be `study(\"name\", [experiment, …])`, or a variable that holds one"))
 }
 
 /// One thread's copy of a script, for calling its functions.
@@ -97,7 +98,8 @@ impl Host {
         let script = plan.sources.script.clone();
         let ast = compile(&engine, &context, &script.name, &script.text)?;
         let imports = context.syntax.borrow()[&*script.name].imports.clone();
-        for (path, alias) in imports {
+        // Without an alias, an import only runs the file's top level.
+        for (path, alias) in imports.into_iter().filter(|(_, alias)| !alias.is_empty()) {
             // Functions find imported modules by their alias; the import statement itself, which
             // belongs to the top level, does not run here.
             let line = format!("import {path:?} as {alias};");

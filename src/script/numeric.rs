@@ -17,8 +17,10 @@ fn arithmetic<T>(message: &str) -> Fallible<T> {
     Err(Box::new(EvalAltResult::ErrorArithmetic(message.into(), Position::NONE)))
 }
 
+type Unary = fn(f64) -> f64;
+
 /// Functions of one float that are registered under their own names, for integers as well.
-const UNARY: &[(&str, fn(f64) -> f64)] = &[
+const UNARY: &[(&str, Unary)] = &[
     ("sin", math::sin),
     ("cos", math::cos),
     ("tan", math::tan),
@@ -35,6 +37,8 @@ const UNARY: &[(&str, fn(f64) -> f64)] = &[
     ("ln", math::ln),
     ("log", math::log10),
     ("sqrt", f64::sqrt),
+    ("to_radians", f64::to_radians),
+    ("to_degrees", f64::to_degrees),
 ];
 
 /// Registers operators and functions on numbers.
@@ -132,4 +136,7 @@ fn conveniences(engine: &mut Engine) {
     engine.register_fn("is_nan", f64::is_nan);
     engine.register_fn("is_finite", f64::is_finite);
     engine.register_fn("is_infinite", f64::is_infinite);
+    engine.register_fn("is_nan", |_: i64| false);
+    engine.register_fn("is_finite", |_: i64| true);
+    engine.register_fn("is_infinite", |_: i64| false);
 }

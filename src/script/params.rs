@@ -4,6 +4,7 @@ use rhai::{Dynamic, Map};
 
 use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{AgentDraft, Spot};
+use super::errors::type_name;
 use super::value::Value;
 use crate::learn::registry::AgentSpec;
 use crate::learn::{ParamValue, Schedule};
@@ -24,6 +25,9 @@ pub(super) fn show(value: &Dynamic) -> String {
         let text = value.to_string();
         return if text.chars().count() > 60 { "an array".into() } else { text };
     }
+    if let Some(schedule) = value.clone().try_cast::<Schedule>() {
+        return ParamValue::Schedule(schedule).to_string();
+    }
     if value.is_map() {
         return "a map".into();
     }
@@ -33,8 +37,7 @@ pub(super) fn show(value: &Dynamic) -> String {
         "EnvDraft" => "an environment".into(),
         "DiscretiserDraft" => "a discretiser".into(),
         "StudyDraft" => "a study".into(),
-        "Schedule" => "a schedule".into(),
-        other => format!("a value of type {other}"),
+        other => format!("a value of type {}", type_name(other)),
     }
 }
 
@@ -51,11 +54,11 @@ pub(super) fn text(value: &Dynamic) -> Option<String> {
 }
 
 /// A whole number from `min` to `max`.
-pub(super) fn whole(key: &str, value: &Dynamic, min: i64, max: i64) -> Result<i64, Diagnostic> {
+pub(super) fn whole(what: &str, value: &Dynamic, min: i64, max: i64) -> Result<i64, Diagnostic> {
     match value.clone().flatten().as_int() {
         Ok(n) if (min..=max).contains(&n) => Ok(n),
         _ => Err(Diagnostic::error(format!(
-            "`{key}` is a whole number from {min} to {max}, got {}",
+            "{what} is a whole number from {min} to {max}, got {}",
             show(value)
         ))),
     }
@@ -127,16 +130,18 @@ pub(super) fn merge_agent(
     Ok(())
 }
 
-/// The `#{ steps: true }` at the end of a schedule.
-pub(super) fn per_step(options: &Map) -> Result<bool, Diagnostic> {
+/// The `#{ steps: true }` at the end of a schedule; `spot` finds the place of a key.
+pub(super) fn per_step(options: &Map, spot: impl Fn(&str) -> Spot) -> Result<bool, Diagnostic> {
     let mut steps = false;
     for (key, value) in options {
+        let place = || spot(key).place();
         if key != "steps" {
             return Err(Diagnostic::error(format!("a schedule has no option `{key}`"))
+                .at(place())
                 .hint("the only one is `steps: true`"));
         }
         steps = value.clone().flatten().as_bool().map_err(|_| {
-            Diagnostic::error(format!("`steps` is true or false, got {}", show(value)))
+            Diagnostic::error(format!("`steps` is true or false, got {}", show(value))).at(place())
         })?;
     }
     Ok(steps)

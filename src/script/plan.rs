@@ -29,6 +29,13 @@ pub struct Callback {
     pub digest: String,
 }
 
+impl Callback {
+    /// How it is called inside a message.
+    pub(super) fn described(&self) -> String {
+        if self.label == "closure" { "(a closure)".into() } else { format!("`{}`", self.label) }
+    }
+}
+
 /// On what a potential is evaluated when states are discretised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -36,8 +36,13 @@ pub(super) fn plan(
     let mut variants: Vec<Variant> = Vec::with_capacity(study.experiments.len());
     for draft in &study.experiments {
         let variant = resolver.variant(draft, &mut warnings)?;
-        if variants.iter().any(|v| v.name == variant.name) {
-            let place = draft.name.as_ref().map_or(draft.spot.place(), |n| n.spot.place());
+        if let Some(i) = variants.iter().position(|v| v.name == variant.name) {
+            // A name that both have from the same place is inherited: the mistake is where the
+            // second one comes to be.
+            let name_place = |d: &ExperimentDraft| d.name.as_ref().and_then(|n| n.spot.place());
+            let place = name_place(draft)
+                .filter(|place| name_place(&study.experiments[i]).as_ref() != Some(place))
+                .or_else(|| draft.spot.place());
             return Err(Diagnostic::error(format!("two variants are called `{}`", variant.name))
                 .at(place)
                 .hint("give each a `name` of its own"));
@@ -119,12 +124,11 @@ impl Resolver<'_> {
         }
         if potential.is_some()
             && !draft.potential_raw
-            && let DiscretiserSpec::Cells { cell, .. } = &discretiser
+            && matches!(discretiser, DiscretiserSpec::Cells { .. })
         {
-            return Err(Diagnostic::error(format!(
-                "scripted cells (`{}`) have no representative to evaluate the potential on",
-                cell.label
-            ))
+            return Err(Diagnostic::error(
+                "scripted cells have no representative to evaluate the potential on",
+            )
             .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
             .hint("use bins(..), or say `potential_on: \"raw\"`"));
         }
@@ -249,16 +253,23 @@ impl Resolver<'_> {
             let given = arities[0].saturating_sub(captures.len());
             let s = if given == 1 { "" } else { "s" };
             return fail(Diagnostic::error(format!(
-                "`{label}` takes {given} argument{s}; here a function {signature} is expected"
+                "{} takes {given} argument{s}; here a function {signature} is expected",
+                if is_closure { "this closure".to_string() } else { format!("`{label}`") }
             )));
         }
-        let digest = self.digest(name, &captures);
+        let digest = self.digest(name, &captures, &mut Vec::new());
         Ok(Callback { function: name.to_string(), captures, label, place, digest })
     }
 
     /// Hashes everything that can change the function's results. Reachability goes by names, which
     /// errs on the side of too much.
-    fn digest(&self, function: &str, captures: &[Value]) -> String {
+    /// `within` names the functions whose digests are being made: a constant may hold a function
+    /// that uses that constant.
+    fn digest(&self, function: &str, captures: &[Value], within: &mut Vec<String>) -> String {
+        if let Some(level) = within.iter().position(|name| name == function) {
+            return format!("recursion {level}");
+        }
+        within.push(function.to_string());
         let script = self.host.context.sources.borrow().script.clone();
         let syntax = self.host.context.syntax.borrow();
         let syntax = &syntax[&*script.name];
@@ -287,7 +298,7 @@ impl Resolver<'_> {
             parts.insert(format!("{} {text}", if is_entry { "entry" } else { "function" }));
         }
         for (name, value) in self.constants.iter().filter(|(name, _)| used.contains(*name)) {
-            parts.insert(format!("const {name} = {}", self.canonical(value)));
+            parts.insert(format!("const {name} = {}", self.canonical(value, within)));
         }
         if syntax.imports.iter().any(|(_, alias)| used.contains(alias)) {
             for (path, source) in &self.host.context.sources.borrow().imports {
@@ -297,8 +308,9 @@ impl Resolver<'_> {
             }
         }
         for (i, value) in captures.iter().enumerate() {
-            parts.insert(format!("capture {i} = {}", self.canonical(value)));
+            parts.insert(format!("capture {i} = {}", self.canonical(value, within)));
         }
+        within.pop();
         let mut hash = Sha256::new();
         for part in parts {
             hash.update((part.len() as u64).to_le_bytes());
@@ -308,17 +320,18 @@ impl Resolver<'_> {
     }
 
     /// A value as text, with functions replaced by their digests (their names may be made up).
-    fn canonical(&self, value: &Value) -> String {
+    fn canonical(&self, value: &Value, within: &mut Vec<String>) -> String {
         match value {
-            Value::Fn { name, captures } => format!("fn {}", self.digest(name, captures)),
+            Value::Fn { name, captures } => format!("fn {}", self.digest(name, captures, within)),
             Value::Array(items) => {
                 format!(
                     "[{}]",
-                    items.iter().map(|v| self.canonical(v)).collect::<Vec<_>>().join(",")
+                    items.iter().map(|v| self.canonical(v, within)).collect::<Vec<_>>().join(",")
                 )
             }
             Value::Map(entries) => {
-                let entries = entries.iter().map(|(k, v)| format!("{k:?}:{}", self.canonical(v)));
+                let entries =
+                    entries.iter().map(|(k, v)| format!("{k:?}:{}", self.canonical(v, within)));
                 format!("{{{}}}", entries.collect::<Vec<_>>().join(","))
             }
             Value::Float(x) => format!("{:016x}", x.to_bits()),
@@ -361,7 +374,8 @@ fn dims(bins: &[BinDraft], schema: &Schema, spec: &EnvSpec) -> Result<Vec<Dim>, 
             Err(i) if *i < schema.fields.len() => *i,
             Err(i) => {
                 return Err(Diagnostic::error(format!(
-                    "bin number {i} is one too many: the state of {} has {} fields",
+                    "bin number {} is one too many: the state of {} has {} fields",
+                    i + 1,
                     spec.id,
                     schema.fields.len()
                 ))
@@ -379,8 +393,9 @@ fn dims(bins: &[BinDraft], schema: &Schema, spec: &EnvSpec) -> Result<Vec<Dim>, 
 /// Bins to suggest: every field, over its declared range or, where that is infinite, ±3.
 fn example_bins(schema: &Schema) -> String {
     let fields = schema.fields.iter().map(|f| {
-        let lo = if f.low.is_finite() { f.low } else { -3.0 };
-        let hi = if f.high.is_finite() { f.high } else { 3.0 };
+        // Bounds are single-precision numbers: as such they are short.
+        let lo = if f.low.is_finite() { f.low as f32 } else { -3.0 };
+        let hi = if f.high.is_finite() { f.high as f32 } else { 3.0 };
         format!("{}: [{lo:?}, {hi:?}, 12]", f.name)
     });
     format!("bins(#{{ {} }})", fields.collect::<Vec<_>>().join(", "))

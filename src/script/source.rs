@@ -70,7 +70,8 @@ pub(crate) fn plain(error: &std::io::Error) -> String {
 
 /// Bytes in hexadecimal.
 pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
+    let digit = |n: u8| char::from_digit(n.into(), 16).expect("four bits");
+    bytes.iter().flat_map(|b| [digit(b >> 4), digit(b & 15)]).collect()
 }
 
 /// A script and everything it imports.
@@ -150,7 +151,7 @@ impl SourceSet {
     /// `diagnostic` with its source line filled in.
     pub fn annotate(&self, mut diagnostic: Diagnostic) -> Diagnostic {
         if let Some(place) = &diagnostic.place {
-            diagnostic.source_line = self.line(place);
+            diagnostic.source_line = self.line(place).map(Into::into);
         }
         diagnostic
     }

@@ -1,11 +1,14 @@
 //! What callbacks receive: states and steps.
 
+use std::collections::BTreeSet;
 use std::rc::Rc;
+use std::sync::OnceLock;
 
 use rhai::{Dynamic, Engine, EvalAltResult, Position};
 
 use super::diagnostic::{Diagnostic, suggest};
 use super::engine::Context;
+use crate::env::specs;
 use crate::mdp::{FieldKind, Schema};
 use crate::shaping::MAX_FIELDS;
 
@@ -52,6 +55,22 @@ impl State {
         Some(value(*kind, *x))
     }
 
+    /// The field or fact called `name`, for scripts.
+    fn get(&self, name: &str) -> Result<Dynamic, Box<EvalAltResult>> {
+        self.named(name).map_or_else(
+            || {
+                let fields = self.schema.fields.iter().map(|f| f.name);
+                let facts = self.schema.facts.iter().map(|f| f.0);
+                let names: Vec<&str> = fields.chain(facts).collect();
+                fail(
+                    Diagnostic::error(format!("this environment's state has no field `{name}`"))
+                        .maybe_hint(suggest(name, names)),
+                )
+            },
+            Ok,
+        )
+    }
+
     fn indexed(&self, index: i64) -> Option<Dynamic> {
         let n = self.schema.fields.len() as i64;
         let i = if index < 0 { index.checked_add(n)? } else { index };
@@ -71,25 +90,32 @@ fn fail<T>(diagnostic: Diagnostic) -> Result<T, Box<EvalAltResult>> {
     Err(Box::new(EvalAltResult::ErrorRuntime(Dynamic::from(diagnostic), Position::NONE)))
 }
 
+/// The names of every environment's fields and facts.
+fn names() -> &'static BTreeSet<&'static str> {
+    static NAMES: OnceLock<BTreeSet<&'static str>> = OnceLock::new();
+    NAMES.get_or_init(|| {
+        let none = serde_json::Map::new();
+        let schemas = specs().iter().filter_map(|spec| spec.make(&none).ok()).map(|e| e.schema());
+        schemas
+            .flat_map(|s| {
+                let facts: Vec<_> = s.facts.iter().map(|f| f.0).collect();
+                s.fields.iter().map(|f| f.name).chain(facts).collect::<Vec<_>>()
+            })
+            .collect()
+    })
+}
+
 const STEP_FIELDS: [&str; 7] =
     ["state", "action", "reward", "next_state", "terminated", "truncated", "step"];
 
 /// Registers both types with their properties.
 pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     engine.register_type_with_name::<State>("State");
-    engine.register_indexer_get(|s: &mut State, name: &str| {
-        s.named(name).map_or_else(
-            || {
-                let fields = s.schema.fields.iter().map(|f| f.name);
-                let names: Vec<&str> = fields.chain(s.schema.facts.iter().map(|f| f.0)).collect();
-                fail(
-                    Diagnostic::error(format!("this environment's state has no field `{name}`"))
-                        .maybe_hint(suggest(name, names)),
-                )
-            },
-            Ok,
-        )
-    });
+    // Rhai finds a getter at once, and the indexer only after it has looked for one in vain.
+    for &name in names() {
+        engine.register_get(name, move |s: &mut State| s.get(name));
+    }
+    engine.register_indexer_get(|s: &mut State, name: &str| s.get(name));
     engine.register_indexer_get(|s: &mut State, index: i64| {
         s.indexed(index).map_or_else(
             || {
@@ -123,6 +149,9 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     engine.register_get("step", move |t: &mut StepView| {
         step_read.set(true);
         t.step
+    });
+    engine.register_indexer_set(|_: &mut StepView, name: &str, _: Dynamic| {
+        fail::<()>(Diagnostic::error(format!("steps are read-only: `{name}` cannot be assigned")))
     });
     engine.register_indexer_get(|_: &mut StepView, name: &str| {
         let diagnostic = Diagnostic::error(format!("a step has no field `{name}`"));

@@ -19,8 +19,12 @@ pub(super) struct Syntax {
     pub(super) variables: Vec<String>,
     /// Imports at the top level: (path, alias), where the path is a literal.
     pub(super) imports: Vec<(String, String)>,
+    /// Names and numbers of parameters of the functions, closures left out.
+    pub(super) functions: Vec<(String, usize)>,
+    /// An import elsewhere, or of a computed path: the host could not repeat it for callbacks.
+    pub(super) misplaced_import: Option<At>,
     /// By the position of a call: the keys of the map literals among its arguments, as dotted
-    /// paths, and their positions.
+    /// paths, and their positions; the items of array literals count as keys `0`, `1`, ….
     pub(super) keys: BTreeMap<At, BTreeMap<String, At>>,
     /// By the position of a call: where its arguments start.
     pub(super) args: BTreeMap<At, Vec<At>>,
@@ -36,14 +40,19 @@ impl Syntax {
     /// Reads the tree of one file.
     pub(super) fn of(ast: &AST) -> Self {
         let mut syntax = Self::default();
+        for f in ast.iter_functions().filter(|f| !f.name.starts_with("anon$")) {
+            syntax.functions.push((f.name.to_string(), f.params.len()));
+        }
+        let mut proper = Vec::new();
         for stmt in ast.statements() {
             match stmt {
                 Stmt::Var(x, flags, _) if flags.intersects(ASTFlags::CONSTANT) => {
                     syntax.constants.push(x.0.name.to_string());
                 }
                 Stmt::Var(x, ..) => syntax.variables.push(x.0.name.to_string()),
-                Stmt::Import(x, _) => {
+                Stmt::Import(x, pos) => {
                     if let Expr::StringConstant(path, _) = &x.0 {
+                        proper.push(at(*pos));
                         syntax.imports.push((path.to_string(), x.1.name.to_string()));
                     }
                 }
@@ -56,6 +65,9 @@ impl Syntax {
                     ASTNode::Expr(Expr::FnCall(x, pos) | Expr::MethodCall(x, pos))
                     | ASTNode::Stmt(Stmt::FnCall(x, pos)),
                 ) => syntax.call(x, at(*pos)),
+                Some(ASTNode::Stmt(Stmt::Import(_, pos))) if !proper.contains(&at(*pos)) => {
+                    syntax.misplaced_import.get_or_insert(at(*pos));
+                }
                 Some(ASTNode::Expr(Expr::DynamicConstant(value, pos))) => {
                     if let Some(f) = value.read_lock::<rhai::FnPtr>() {
                         syntax.closures.entry(f.fn_name().to_string()).or_insert_with(|| at(*pos));
@@ -66,6 +78,19 @@ impl Syntax {
             true
         });
         syntax
+    }
+
+    /// Where the function `name` begins, given the file's text: a closure's first `|`, or the
+    /// name after `fn`.
+    pub(super) fn definition(&self, text: &str, name: &str) -> Option<At> {
+        if let Some(&at) = self.closures.get(name) {
+            return Some(at);
+        }
+        let tokens = tokens(text);
+        let start = (0..tokens.len()).find_map(|i| function_name(&tokens, i, name))?.start;
+        let before = &text[..start];
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
     }
 
     fn call(&mut self, call: &FnCallExpr, pos: At) {
@@ -87,7 +112,7 @@ impl Syntax {
         // `fn name(…) { … }`, whatever its number of parameters: overloads count together.
         let mut found = Vec::new();
         for i in 0..tokens.len().saturating_sub(1) {
-            if tokens[i].text == "fn" && tokens[i + 1].text == name {
+            if function_name(&tokens, i, name).is_some() {
                 let open = (i..tokens.len()).find(|&k| tokens[k].text == "{")?;
                 let end = open + balanced(&tokens[open..]);
                 found.extend_from_slice(&tokens[i..end]);
@@ -100,13 +125,27 @@ impl Syntax {
 /// Collects the keys of a map literal and of those nested in it, also through calls such as
 /// `q_learning(#{ … })`, whose keys belong to the key that holds the call.
 fn map_keys(expr: &Expr, prefix: &str, keys: &mut BTreeMap<String, At>) {
+    let join = |name: &str| {
+        if prefix.is_empty() { name.to_string() } else { format!("{prefix}.{name}") }
+    };
+    if let Expr::Array(items, _) = expr {
+        for (i, item) in items.iter().enumerate() {
+            keys.insert(join(&i.to_string()), at(item.start_position()));
+        }
+    }
     let Expr::Map(entries, _) = expr else { return };
     for (key, value) in &entries.0 {
-        let path =
-            if prefix.is_empty() { key.name.to_string() } else { format!("{prefix}.{}", key.name) };
+        let path = join(&key.name);
         map_keys(value, &path, keys);
         keys.insert(path, at(key.pos));
     }
+}
+
+/// The name in `fn name(…)` or `fn Type.name(…)`, if that stands at `i` and is `name`.
+fn function_name<'a>(tokens: &[Token<'a>], i: usize, name: &str) -> Option<Token<'a>> {
+    let rest = tokens.get(i..).filter(|rest| rest[0].text == "fn")?;
+    let open = rest.iter().position(|t| t.text == "(")?;
+    rest[..open].last().copied().filter(|t| t.text == name)
 }
 
 /// Number of tokens of the bracketed group at the start.
@@ -140,15 +179,11 @@ fn closure<'a>(tokens: &[Token<'a>]) -> Vec<Token<'a>> {
     for (i, t) in body.iter().enumerate() {
         match t.text {
             "(" | "[" | "{" => depth += 1,
-            ")" | "]" | "}" if depth == 0 => {
+            ")" | "]" | "}" | "," | ";" if depth == 0 => {
                 end = i;
                 break;
             }
             ")" | "]" | "}" => depth -= 1,
-            "," | ";" if depth == 0 => {
-                end = i;
-                break;
-            }
             _ => {}
         }
     }

@@ -4,6 +4,9 @@
 use rhai::{Dynamic, FnPtr};
 use serde::{Deserialize, Serialize};
 
+/// How deeply values may be nested: deeper ones would overflow the stack.
+pub(super) const MAX_DEPTH: usize = 64;
+
 /// A constant or captured value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -40,6 +43,13 @@ impl Value {
     /// # Errors
     /// The name of the type, if it is not plain data.
     pub(super) fn freeze(value: &Dynamic) -> Result<Self, String> {
+        Self::freeze_at(value, 0)
+    }
+
+    fn freeze_at(value: &Dynamic, depth: usize) -> Result<Self, String> {
+        if depth > MAX_DEPTH {
+            return Err("a value that holds itself, or is nested without end".into());
+        }
         let value = value.clone().flatten();
         if value.is_unit() {
             return Ok(Self::Unit);
@@ -59,23 +69,24 @@ impl Value {
         if value.is_string() {
             return Ok(Self::Str(value.into_string().unwrap_or_default()));
         }
+        let inner = |v: &Dynamic| Self::freeze_at(v, depth + 1);
         if let Some(array) = value.read_lock::<rhai::Array>() {
-            return array.iter().map(Self::freeze).collect::<Result<_, _>>().map(Self::Array);
+            return array.iter().map(inner).collect::<Result<_, _>>().map(Self::Array);
         }
         if let Some(map) = value.read_lock::<rhai::Map>() {
-            let entries = map.iter().map(|(k, v)| Ok((k.to_string(), Self::freeze(v)?)));
+            let entries = map.iter().map(|(k, v)| Ok((k.to_string(), inner(v)?)));
             return entries.collect::<Result<_, String>>().map(Self::Map);
         }
         if let Some(f) = value.read_lock::<FnPtr>() {
-            return Self::freeze_fn(&f);
+            let captures = f.iter_curry().map(inner).collect::<Result<_, _>>()?;
+            return Ok(Self::Fn { name: f.fn_name().to_string(), captures });
         }
-        Err(value.type_name().rsplit("::").next().unwrap_or_default().to_string())
+        Err(super::params::show(&value))
     }
 
     /// As [`Self::freeze`], of a function pointer.
     pub(super) fn freeze_fn(f: &FnPtr) -> Result<Self, String> {
-        let captures = f.iter_curry().map(Self::freeze).collect::<Result<_, _>>()?;
-        Ok(Self::Fn { name: f.fn_name().to_string(), captures })
+        Self::freeze(&Dynamic::from(f.clone()))
     }
 
     /// The script's value again; `function` finds a script function by its name.
