@@ -165,7 +165,7 @@ where
                 ending,
             });
         }
-        if step % STOP_INTERVAL == 0 && stop.load(Ordering::Relaxed) {
+        if step.is_multiple_of(STOP_INTERVAL) && stop.load(Ordering::Relaxed) {
             return Err((None, step));
         }
         action = agent.step(r, next);

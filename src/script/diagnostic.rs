@@ -145,10 +145,13 @@ pub(crate) fn nearest<'a>(
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
     let lower = name.to_lowercase();
+    // `column` for `col`, `eps` for `epsilon`: not near by letters, but what was meant.
+    let begins =
+        |c: &str| name.len().min(c.len()) >= 3 && (lower.starts_with(c) || c.starts_with(&lower));
     candidates
         .into_iter()
         .map(|c| (strsim::damerau_levenshtein(&lower, &c.to_lowercase()), c))
-        .filter(|(distance, c)| *distance <= (name.len().max(c.len()) / 3).max(1))
+        .filter(|(distance, c)| *distance <= (name.len().max(c.len()) / 3).max(1) || begins(c))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, c)| c)
 }
@@ -181,6 +184,8 @@ mod tests {
     fn suggestions_are_near_or_complete() {
         let keys = ["episodes", "epsilon", "env"];
         assert_eq!(suggest("episods", keys).unwrap(), "did you mean `episodes`?");
+        assert_eq!(suggest("eps", ["alpha", "epsilon"]).unwrap(), "did you mean `epsilon`?");
+        assert_eq!(suggest("column", ["row", "col"]).unwrap(), "did you mean `col`?");
         assert_eq!(suggest("whatever", keys).unwrap(), "one of: episodes, epsilon, env");
     }
 }
