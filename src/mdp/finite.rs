@@ -44,6 +44,35 @@ pub struct FiniteMdp {
     offsets: Vec<u32>,
     outcomes: Vec<Outcome>,
     initial: Vec<f64>,
+    /// One per (s, a).
+    draws: Vec<Draw>,
+}
+
+/// What it takes to draw an outcome of (s, a): half a cache line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Draw {
+    first: u32,
+    len: u32,
+    /// The largest running sum of the probabilities up to each outcome; infinite beyond the last.
+    /// Empty slots all of them if there are more outcomes than slots.
+    ceilings: [f64; 3],
+}
+
+impl Draw {
+    fn new(first: usize, outcomes: &[Outcome]) -> Self {
+        let mut ceilings = [f64::INFINITY; 3];
+        if outcomes.len() <= ceilings.len() {
+            let (mut sum, mut ceiling) = (0.0f64, f64::NEG_INFINITY);
+            for (slot, outcome) in ceilings.iter_mut().zip(outcomes) {
+                sum += outcome.probability;
+                // The first sum above u is where the largest so far first is above u; the latter
+                // never falls, and can be counted up to without a look at each in turn.
+                ceiling = ceiling.max(sum);
+                *slot = ceiling;
+            }
+        }
+        Self { first: first as u32, len: outcomes.len() as u32, ceilings }
+    }
 }
 
 /// Why a table is not a [`FiniteMdp`].
@@ -79,6 +108,7 @@ impl FiniteMdp {
         }
         let mut offsets = Vec::with_capacity(n_states * n_actions + 1);
         let mut outcomes = Vec::new();
+        let mut draws = Vec::with_capacity(n_states * n_actions);
         offsets.push(0);
         for (s, row) in table.iter().enumerate() {
             if row.len() != n_actions {
@@ -97,11 +127,12 @@ impl FiniteMdp {
                         bad.next_state
                     )));
                 }
+                draws.push(Draw::new(outcomes.len(), list));
                 outcomes.extend_from_slice(list);
                 offsets.push(outcomes.len() as u32);
             }
         }
-        Ok(Self { n_states, n_actions, offsets, outcomes, initial })
+        Ok(Self { n_states, n_actions, offsets, outcomes, initial, draws })
     }
 
     /// Number of states.
@@ -135,6 +166,21 @@ impl FiniteMdp {
     #[inline]
     pub fn of(&self, s: usize, a: usize) -> &[Outcome] {
         &self.outcomes[self.range(s, a)]
+    }
+
+    /// Draws an outcome of (s, a), as [`categorical`] does; an index into [`Self::outcomes`].
+    #[inline]
+    fn draw(&self, s: usize, a: usize, rng: &mut NumpyRng) -> usize {
+        let draw = &self.draws[s * self.n_actions + a];
+        let i = if draw.len as usize <= draw.ceilings.len() {
+            // No branch on the draw itself: nobody can predict it.
+            let u = rng.random();
+            let passed = draw.ceilings.iter().map(|&ceiling| u32::from(ceiling <= u)).sum();
+            if passed == draw.len { 0 } else { passed }
+        } else {
+            categorical(self.of(s, a).iter().map(|o| o.probability), rng) as u32
+        };
+        (draw.first + i) as usize
     }
 
     /// Whether an episode can be *in* state `s` and act: reachable from an initial state by
@@ -225,11 +271,10 @@ impl FiniteEnv {
     /// Samples an outcome of `action` and moves there. Returns it with the new state.
     #[inline]
     pub fn step(&mut self, action: usize, rng: &mut NumpyRng) -> (FiniteState, &Outcome) {
-        let range = self.mdp.range(self.state as usize, action);
-        let outcomes = &self.mdp.outcomes[range.clone()];
-        let i = categorical(outcomes.iter().map(|o| o.probability), rng);
-        let outcome = &outcomes[i];
+        let mdp = &*self.mdp;
+        let i = mdp.draw(self.state as usize, action, rng);
+        let outcome = &mdp.outcomes[i];
         self.state = outcome.next_state;
-        (FiniteState { index: self.state, outcome: (range.start + i) as u32 }, outcome)
+        (FiniteState { index: self.state, outcome: i as u32 }, outcome)
     }
 }
