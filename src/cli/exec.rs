@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
 use clap::Args as ClapArgs;
@@ -115,16 +116,17 @@ fn train(
     let total: u64 =
         plan.variants.iter().map(|v| u64::from(v.episodes) * v.seeds.0.len() as u64).sum();
     let bar = bar(total, args.quiet, progress);
-    let done = std::sync::atomic::AtomicBool::new(false);
     let result = std::thread::scope(|scope| {
-        scope.spawn(|| {
-            while !done.load(Ordering::Relaxed) {
+        let (done, wait) = std::sync::mpsc::channel::<()>();
+        let bar = &bar;
+        scope.spawn(move || {
+            // Ends at once when the sender is dropped: a short run need not wait for the next look.
+            while wait.recv_timeout(Duration::from_millis(50)) == Err(RecvTimeoutError::Timeout) {
                 bar.set_position(progress.episodes.load(Ordering::Relaxed));
-                std::thread::sleep(Duration::from_millis(50));
             }
         });
         let result = execute(plan, &results.store, jobs, progress);
-        done.store(true, Ordering::Relaxed);
+        drop(done);
         result
     });
     bar.finish_and_clear();

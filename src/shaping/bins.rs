@@ -79,6 +79,9 @@ impl Bins {
                     format!("the lower bound {} is not below the upper {}", d.lo, d.hi),
                 );
             }
+            if !(d.hi - d.lo).is_finite() {
+                return fail(i, format!("from {} to {} is too far for bins", d.lo, d.hi));
+            }
             if d.n == 0 {
                 return fail(i, "the number of bins is at least 1, got 0".into());
             }
