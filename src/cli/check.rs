@@ -8,6 +8,7 @@ use clap::Args as ClapArgs;
 use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::check;
+use crate::report::claims::rehearse;
 use crate::script::{Callback, DiscretiserSpec, PhiOn, Plan, Variant, load};
 
 #[derive(Debug, ClapArgs)]
@@ -21,7 +22,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut last = None;
     for script in &args.scripts {
-        match load(script).and_then(|plan| check(&plan).map(|()| plan)) {
+        match load(script)
+            .and_then(|plan| check(&plan).and_then(|()| rehearse(&plan)).map(|()| plan))
+        {
             Ok(plan) => {
                 for warning in &plan.warnings {
                     diagnostic(warning);

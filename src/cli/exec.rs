@@ -12,7 +12,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::{Audit, ExecuteError, Execution, Progress, audit_variant, check, execute};
-use crate::report::results::{Findings, FolderError, Results, variant_json};
+use crate::report::claims::{judge, rehearse};
+use crate::report::results::{Findings, FolderError, Results};
 use crate::report::table::{StudyTable, TableRow};
 use crate::script::{Host, Plan, SeedList, load};
 
@@ -45,6 +46,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     restrict(&mut plan, args);
     say(&plan, args.quiet);
     check(&plan)?;
+    rehearse(&plan)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("results").join(&plan.name));
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let jobs = args.jobs.map_or(cores, usize::from);
@@ -198,17 +200,11 @@ fn expectations(
     findings: &Findings,
     quiet: bool,
 ) -> Result<bool, Failure> {
-    let mut results = serde_json::Map::new();
-    for (summary, audit) in findings.summaries.iter().zip(&findings.audits) {
-        results.insert(summary.name.clone(), variant_json(summary, audit));
-    }
-    let results = serde_json::Value::Object(results);
     let mut all = true;
-    for expectation in &plan.expectations {
-        let holds = host.callbacks().holds(&expectation.check, &results)?;
+    for (text, holds) in judge(plan, host, findings)? {
         all &= holds;
         if !quiet || !holds {
-            note(&format!("{} {}", if holds { "ok    " } else { "FAILED" }, expectation.text));
+            note(&format!("{} {text}", if holds { "ok    " } else { "FAILED" }));
         }
     }
     Ok(all)

@@ -39,6 +39,15 @@ impl Audit {
         }
     }
 
+    /// A verdict with every field filled in, for rehearsing what reads it.
+    pub fn made_up() -> Self {
+        Self {
+            states_changed: Some(0),
+            identity_holds: Some(true),
+            ..Self::new("potential-based", Some(true), "made up")
+        }
+    }
+
     /// The verdict with the number of changed states, for tables.
     pub fn label(&self) -> String {
         match self.states_changed {
@@ -110,7 +119,11 @@ impl EnvVisitor for Judge<'_> {
             return Ok(Audit::new(
                 "inconclusive",
                 None,
-                "with gamma = 1 some policy never ends and has no value: use gamma < 1",
+                if gamma < 1.0 {
+                    "some value is not finite: are the rewards too large?"
+                } else {
+                    "with gamma = 1 some policy never ends and has no value: use gamma < 1"
+                },
             ));
         };
         let (verdict, preserved, basis) = match result.verdict {

@@ -47,6 +47,12 @@ pub enum TrainError {
         /// Step of the episode.
         step: u32,
     },
+    /// The learned return of this episode (from 0) is not finite: rewards or potentials are so
+    /// large that sums of them overflow, and what is learned from them means nothing.
+    NotFinite {
+        /// Episode.
+        episode: u32,
+    },
     /// The run was asked to stop.
     Interrupted,
 }
@@ -61,7 +67,7 @@ const STOP_INTERVAL: u32 = 1 << 16;
 /// the same continuation, or the fixed point moves.
 ///
 /// # Errors
-/// If a callback fails, or `stop` is raised.
+/// If a callback fails, returns stop being finite, or `stop` is raised.
 pub fn train<E, D, P, R, A>(
     world: &mut World<E, D, P, R>,
     agent: &mut A,
@@ -82,6 +88,7 @@ where
             return Err(TrainError::Interrupted);
         }
         match play(world, agent, limits, rng, stop) {
+            Ok(row) if !row.learned.is_finite() => return Err(TrainError::NotFinite { episode }),
             Ok(row) => each(row),
             Err((None, _)) => return Err(TrainError::Interrupted),
             Err((Some(fault), step)) => return Err(TrainError::Fault { fault, episode, step }),

@@ -69,15 +69,23 @@ impl UnitError {
         Self::Script(Box::new(d.note(format!("in variant `{}`, seed {seed}", variant.name))))
     }
 
+    /// Episodes are counted from 1, as in `episodes.csv`, steps from 0, as in `t.step`.
     fn train(variant: &Variant, seed: u64, error: TrainError) -> Self {
-        match error {
-            TrainError::Interrupted => Self::Interrupted,
-            TrainError::Fault { fault, episode, step } => match Self::fault(variant, seed, fault) {
-                Self::Script(d) => {
-                    Self::Script(Box::new(d.note(format!("in episode {episode}, step {step}"))))
-                }
-                Self::Interrupted => Self::Interrupted,
-            },
+        let (fault, moment) = match error {
+            TrainError::Interrupted => return Self::Interrupted,
+            TrainError::Fault { fault, episode, step } => {
+                (fault, format!("in episode {}, t.step = {step}", episode + 1))
+            }
+            TrainError::NotFinite { episode } => {
+                let d = Diagnostic::error("the learned return is not finite")
+                    .at(variant.place.clone())
+                    .hint("rewards or potentials are too large to be added up");
+                (Fault(Box::new(d)), format!("in episode {}", episode + 1))
+            }
+        };
+        match Self::fault(variant, seed, fault) {
+            Self::Script(d) => Self::Script(Box::new(d.note(moment))),
+            Self::Interrupted => Self::Interrupted,
         }
     }
 }
@@ -99,7 +107,10 @@ pub fn run_unit(
     let env = variant.env.make(&variant.kwargs).map_err(|e| {
         UnitError::Script(Box::new(Diagnostic::error(e.message).maybe_hint(e.hint)))
     })?;
-    env.visit(RunUnit { host, variant, seed, stop, each })
+    env.visit(RunUnit { host, variant, seed, stop, each }).map_err(|e| match e {
+        UnitError::Script(d) => UnitError::Script(Box::new(host.annotate(*d))),
+        UnitError::Interrupted => UnitError::Interrupted,
+    })
 }
 
 struct RunUnit<'a> {

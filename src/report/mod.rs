@@ -1,6 +1,7 @@
 //! What a study looks like from outside: summaries, tables and plots of results.
 //!
 //! - [`results`]: the results folder and every file derived from its units
+//! - [`claims`]: what a study expects of its results
 //! - [`manifest`] writes `study.json`
 //! - [`summary`]: per-variant statistics, as in `summary.json`
 //! - [`curves`]: learning curves as SVG
@@ -8,6 +9,7 @@
 //! - `legend`: the legend of the curves
 //! - `svg`: scales, ticks and escaping for hand-written SVG
 
+pub mod claims;
 pub mod curves;
 mod legend;
 pub mod manifest;

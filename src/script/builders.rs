@@ -15,6 +15,7 @@ use super::params::{merge_agent, number, per_step, show, whole};
 use super::plan::GoldenBudget;
 use crate::learn::registry::{AGENTS, AgentSpec};
 use crate::learn::{AgentConfig, Schedule, Unit};
+use crate::shaping::MAX_CELLS;
 
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
 
@@ -120,7 +121,7 @@ fn studies(engine: &mut Engine, context: &Rc<Context>) {
         let call = Call::new(&c, &native);
         if !is_name(name) {
             return call.fail(Diagnostic::error(
-                "a study's name is a string of 1 to 80 characters without / or line breaks",
+                "a study's name is a string of 1 to 80 characters, without / or line breaks, not beginning or ending with a blank",
             ));
         }
         let experiments =
@@ -333,7 +334,7 @@ fn bin(field: Result<String, usize>, value: &Dynamic, spot: Spot) -> Result<BinD
     let list = value.read_lock::<Array>().ok_or_else(wrong)?;
     let [lo, hi, n] = list.as_slice() else { return Err(wrong()) };
     let (Some(lo), Some(hi)) = (number(lo), number(hi)) else { return Err(wrong()) };
-    let n = whole(&format!("the number of bins of {}", label()), n, 1, 1 << 28)
+    let n = whole(&format!("the number of bins of {}", label()), n, 1, MAX_CELLS as i64)
         .map_err(|d| d.at(spot.place()))? as usize;
     if lo >= hi || !lo.is_finite() || !hi.is_finite() {
         return Err(Diagnostic::error(format!(
@@ -346,17 +347,16 @@ fn bin(field: Result<String, usize>, value: &Dynamic, spot: Spot) -> Result<BinD
 }
 
 fn shape(sizes: &[Dynamic]) -> Result<Vec<usize>, Diagnostic> {
-    const MAX: usize = 1 << 28;
     if sizes.is_empty() {
         return Err(Diagnostic::error("`cells` needs at least one size"));
     }
     let sizes: Vec<usize> = sizes
         .iter()
-        .map(|n| whole("the number of cells", n, 1, MAX as i64).map(|n| n as usize))
+        .map(|n| whole("the number of cells", n, 1, MAX_CELLS as i64).map(|n| n as usize))
         .collect::<Result<_, _>>()?;
     let total = sizes.iter().try_fold(1usize, |product, n| product.checked_mul(*n));
-    if total.is_none_or(|n| n > MAX) {
-        return Err(Diagnostic::error(format!("more than {MAX} cells: use fewer")));
+    if total.is_none_or(|n| n > MAX_CELLS) {
+        return Err(Diagnostic::error(format!("more than {MAX_CELLS} cells: use fewer")));
     }
     Ok(sizes)
 }

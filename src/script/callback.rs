@@ -10,6 +10,7 @@ use super::engine::{CALLBACK_OPERATIONS, Context};
 use super::errors::diagnostic;
 use super::params::show;
 use super::plan::Callback;
+use super::record;
 use super::state::{State, StepView};
 use crate::mdp::{Env, Schema};
 use crate::shaping::{CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn};
@@ -82,7 +83,7 @@ impl Callbacks {
         Some(Place { file: script.name, line, column })
     }
 
-    fn annotate(&self, diagnostic: Diagnostic) -> Diagnostic {
+    pub(super) fn annotate(&self, diagnostic: Diagnostic) -> Diagnostic {
         self.context.sources.borrow().annotate(diagnostic)
     }
 
@@ -207,7 +208,7 @@ impl Callbacks {
     /// # Errors
     /// If the claim cannot be evaluated, or is not true or false.
     pub fn holds(&self, claim: &Callback, results: &serde_json::Value) -> Result<bool, Diagnostic> {
-        let value = self.call(&self.prepare(claim), dynamic(results))?;
+        let value = self.call(&self.prepare(claim), record::dynamic("the results", results))?;
         value.as_bool().map_err(|_| {
             let d =
                 Diagnostic::error(format!("an expectation is true or false, got {}", show(&value)));
@@ -217,22 +218,6 @@ impl Callbacks {
                 ),
             )
         })
-    }
-}
-
-fn dynamic(json: &serde_json::Value) -> Dynamic {
-    match json {
-        serde_json::Value::Null => Dynamic::UNIT,
-        serde_json::Value::Bool(b) => (*b).into(),
-        serde_json::Value::Number(n) => {
-            n.as_i64().map_or_else(|| n.as_f64().unwrap_or(f64::NAN).into(), Dynamic::from)
-        }
-        serde_json::Value::String(s) => s.clone().into(),
-        serde_json::Value::Array(a) => a.iter().map(dynamic).collect::<rhai::Array>().into(),
-        serde_json::Value::Object(o) => {
-            let map: rhai::Map = o.iter().map(|(k, v)| (k.as_str().into(), dynamic(v))).collect();
-            map.into()
-        }
     }
 }
 

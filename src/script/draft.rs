@@ -217,7 +217,7 @@ impl ExperimentDraft {
     #[expect(clippy::unused_self, reason = "reads as the other setters do")]
     fn name_of(&self, value: &Dynamic) -> Result<String, Diagnostic> {
         text(value).filter(|s| is_name(s)).ok_or_else(|| {
-            wrong("name", "a string of 1 to 80 characters without / or line breaks", value)
+            wrong("name", "a string of 1 to 80 characters, without / or line breaks, not beginning or ending with a blank", value)
         })
     }
 

@@ -13,7 +13,7 @@ use rhai::{
 use super::diagnostic::{Diagnostic, Place};
 use super::source::SourceSet;
 use super::syntax::Syntax;
-use super::{builders, numeric, sandbox, state};
+use super::{builders, numeric, record, sandbox, state};
 
 /// Operations that building the plan may take: about two seconds.
 const PLAN_OPERATIONS: u64 = 20_000_000;
@@ -78,6 +78,7 @@ pub(super) fn engine(context: &Rc<Context>) -> Engine {
     sandbox::register(&mut engine, context);
     numeric::register(&mut engine);
     state::register(&mut engine, context);
+    record::register(&mut engine);
     builders::register(&mut engine, context);
     output(&mut engine, context);
     constants_in_functions(&mut engine, context);

@@ -117,6 +117,11 @@ impl Host {
         Ok(Self { callbacks })
     }
 
+    /// `diagnostic` with its source line filled in.
+    pub fn annotate(&self, diagnostic: Diagnostic) -> Diagnostic {
+        self.callbacks.annotate(diagnostic)
+    }
+
     /// The script's functions.
     pub fn callbacks(&self) -> &Rc<Callbacks> {
         &self.callbacks

@@ -20,6 +20,7 @@ pub mod keys;
 mod numeric;
 mod params;
 mod plan;
+mod record;
 mod resolve;
 mod sandbox;
 mod source;

@@ -50,8 +50,9 @@ struct BinnedDim {
     edges: Vec<f64>,
 }
 
-/// Cells of a table above which memory, not learning, would be the problem: 2^28 states.
-const MAX_CELLS: usize = 1 << 28;
+/// The most cells a table may have, 2^24: with three actions that is 400 MB for every thread, and
+/// no learner would visit so many.
+pub const MAX_CELLS: usize = 1 << 24;
 
 impl Bins {
     /// Bins over `dims`.

@@ -15,7 +15,7 @@ mod discretiser;
 mod potential;
 mod reward;
 
-pub use bins::{Bins, BinsError, Dim};
+pub use bins::{Bins, BinsError, Dim, MAX_CELLS};
 pub use discretiser::{CellFn, Discretiser, ScriptedCells, StateIndex};
 pub use potential::{
     AnyPotential, CellPhiFn, CellPotential, NoPotential, PhiFn, Potential, RawPotential,

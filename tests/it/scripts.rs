@@ -14,6 +14,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use runner::experiment::check;
+use runner::report::claims::rehearse;
 use runner::script::{Diagnostic, Severity, load};
 
 const FOLDER: &str = "tests/wrong";
@@ -51,7 +52,7 @@ fn shown(d: &Diagnostic, script: &Path) -> String {
 
 /// What loading and checking the script says.
 fn actual(script: &Path) -> String {
-    match load(script).and_then(|plan| check(&plan).map(|()| plan)) {
+    match load(script).and_then(|plan| check(&plan).and_then(|()| rehearse(&plan)).map(|()| plan)) {
         Ok(plan) => plan.warnings.iter().map(|d| shown(d, script)).collect(),
         Err(d) => shown(&d, script),
     }

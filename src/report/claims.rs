@@ -1,0 +1,53 @@
+//! The claims a study makes about its results (`.expect(text, |r| …)`).
+
+use serde_json::{Map, Value};
+
+use super::results::{Findings, variant_json};
+use super::summary::summarise;
+use crate::experiment::Audit;
+use crate::script::{Diagnostic, Host, Plan};
+
+/// Evaluates every claim on the findings: its text, and whether it holds.
+///
+/// # Errors
+/// If a claim cannot be evaluated.
+pub fn judge(
+    plan: &Plan,
+    host: &Host,
+    findings: &Findings,
+) -> Result<Vec<(String, bool)>, Diagnostic> {
+    let variants = findings.summaries.iter().zip(&findings.audits);
+    evaluate(plan, host, variants.map(|(s, a)| (s.name.clone(), variant_json(s, a))).collect())
+}
+
+/// Evaluates every claim on made-up results, so that a misspelt statistic is found before an hour
+/// of training and not after.
+///
+/// # Errors
+/// If a claim cannot be evaluated.
+pub fn rehearse(plan: &Plan) -> Result<(), Diagnostic> {
+    if plan.expectations.is_empty() {
+        return Ok(());
+    }
+    let mut results = Map::new();
+    for variant in &plan.variants {
+        let returns = vec![vec![1.0]; variant.seeds.0.len()];
+        let lengths = vec![vec![1]; variant.seeds.0.len()];
+        let threshold = variant.threshold.map(|_| 1.0);
+        let summary = summarise(&variant.name, &returns, &lengths, 1, threshold);
+        results.insert(variant.name.clone(), variant_json(&summary, &Audit::made_up()));
+    }
+    evaluate(plan, &Host::open(plan)?, results).map(|_| ())
+}
+
+fn evaluate(
+    plan: &Plan,
+    host: &Host,
+    results: Map<String, Value>,
+) -> Result<Vec<(String, bool)>, Diagnostic> {
+    let results = Value::Object(results);
+    let claims = plan.expectations.iter();
+    claims
+        .map(|claim| Ok((claim.text.clone(), host.callbacks().holds(&claim.check, &results)?)))
+        .collect()
+}
