@@ -1,12 +1,15 @@
 //! Whether a shaping keeps the optimal policy: solve both models and compare.
 //!
 //! For a potential-based shaping, `Q_F + Φ = Q` for every state and action (Ng, Harada & Russell
-//! 1999), hence equal advantages and equal greedy sets. Numbers are compared on the scale
-//! `S = max(1, max |Q|, max |Φ|, max |F|)`: values to `1e-9 S`, ties to `1e-9 S`; a gap between
-//! actions inside `(1e-11 S, 1e-8 S)` is too close to call.
+//! 1999), hence equal advantages and equal greedy sets.
+//!
+//! Each model is read on its own scale S, the largest of its |Q|, |r| and |Φ|, for that is what
+//! rounding errors are relative to: gaps below `1e-11 S` are ties, gaps above `1e-8 S` are not, and
+//! between the two nothing is certain. A potential of 1e12 drowns the gaps of the plain model: where
+//! those are real but below `1e-8` of the shaped model's scale, its ties prove nothing either.
 
+use crate::learn::QTable;
 use crate::learn::planning::{PolicyIteration, PolicyValueError};
-use crate::learn::{QTable, greedy_set};
 use crate::mdp::FiniteMdp;
 
 /// What comes of the comparison.
@@ -27,7 +30,8 @@ pub struct Preservation {
     pub verdict: Verdict,
     /// Reachable states whose greedy sets differ.
     pub states_changed: Vec<usize>,
-    /// `max |Q_F + Φ − Q| / S` over reachable states: at most 1e-9 for a correct potential.
+    /// `max |Q_F + Φ − Q|` over reachable states, relative to the larger scale (at least 1): at most
+    /// 1e-9 for a correct potential.
     pub identity_error: f64,
     /// Greedy sets of the plain model, one per state.
     pub plain: Vec<Vec<usize>>,
@@ -56,61 +60,88 @@ pub fn preservation(
     let reachable = plain.reachable();
     let q = PolicyIteration { gamma }.solve(plain)?;
     let q_shaped = PolicyIteration { gamma }.solve(shaped)?;
-    let scale = scale(plain, shaped, &q, phi, &reachable);
-    let (mut identity_error, mut close_call) = (0.0f64, false);
+    let zero = vec![0.0; phi.len()];
+    let scale = scale_of(plain, &q, &zero, &reachable);
+    let scale_shaped = scale_of(shaped, &q_shaped, phi, &reachable);
+    let (mut identity_error, mut uncertain) = (0.0f64, false);
     let mut states_changed = Vec::new();
     let (mut sets, mut sets_shaped) = (Vec::new(), Vec::new());
     for s in 0..plain.n_states() {
         let (row, row_shaped) = (q.row(s), q_shaped.row(s));
-        let (set, set_shaped) = (greedy_set(row, scale), greedy_set(row_shaped, scale));
-        if reachable[s] {
-            for (a, b) in row.iter().zip(row_shaped) {
-                identity_error = identity_error.max((b + phi[s] - a).abs() / scale);
-            }
-            close_call |= has_close_gap(row, scale) || has_close_gap(row_shaped, scale);
-            if set != set_shaped {
-                states_changed.push(s);
-            }
+        sets.push(tied(row, scale));
+        sets_shaped.push(tied(row_shaped, scale_shaped));
+        if !reachable[s] {
+            continue;
         }
-        sets.push(set);
-        sets_shaped.push(set_shaped);
+        for (a, b) in row.iter().zip(row_shaped) {
+            let size = scale.max(scale_shaped).max(1.0);
+            identity_error = identity_error.max((b + phi[s] - a).abs() / size);
+        }
+        match compare(row, scale, row_shaped, scale_shaped) {
+            Some(true) => {}
+            Some(false) => states_changed.push(s),
+            None => uncertain = true,
+        }
     }
-    let verdict = match (close_call, states_changed.is_empty()) {
-        (true, _) => Verdict::Inconclusive,
-        (false, true) => Verdict::Preserved,
-        (false, false) => Verdict::Changed,
+    let verdict = match (states_changed.is_empty(), uncertain) {
+        (false, _) => Verdict::Changed,
+        (true, true) => Verdict::Inconclusive,
+        (true, false) => Verdict::Preserved,
     };
     Ok(Preservation { verdict, states_changed, identity_error, plain: sets, shaped: sets_shaped })
 }
 
-/// `S = max(1, max |Q|, max |Φ|, max |F|)` over reachable states.
-fn scale(
-    plain: &FiniteMdp,
-    shaped: &FiniteMdp,
-    q: &QTable,
-    phi: &[f64],
-    reachable: &[bool],
-) -> f64 {
-    let mut scale = 1.0f64;
-    for s in (0..plain.n_states()).filter(|&s| reachable[s]) {
+/// The largest |Q|, |r| and |Φ| over reachable states.
+fn scale_of(mdp: &FiniteMdp, q: &QTable, phi: &[f64], reachable: &[bool]) -> f64 {
+    let mut scale = 0.0f64;
+    for s in (0..mdp.n_states()).filter(|&s| reachable[s]) {
         scale = scale.max(phi[s].abs());
-        for a in 0..plain.n_actions() {
+        for a in 0..mdp.n_actions() {
             scale = scale.max(q.get(s, a).abs());
-            for (o, f) in plain.of(s, a).iter().zip(shaped.of(s, a)) {
-                scale = scale.max((f.reward - o.reward).abs());
+            for o in mdp.of(s, a) {
+                scale = scale.max(o.reward.abs());
             }
         }
     }
     scale
 }
 
-/// Whether some action is below the best by an amount that is neither rounding nor certain.
-fn has_close_gap(row: &[f64], scale: f64) -> bool {
+/// How far an action is below the best: nothing, something, or too close to call.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Gap {
+    Tie,
+    Unclear,
+    Real,
+}
+
+fn gap(row: &[f64], a: usize, scale: f64) -> Gap {
     let best = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    row.iter().any(|q| {
-        let gap = (best - q) / scale;
-        gap > 1e-11 && gap < 1e-8
-    })
+    match best - row[a] {
+        gap if gap <= 1e-11 * scale => Gap::Tie,
+        gap if gap >= 1e-8 * scale => Gap::Real,
+        _ => Gap::Unclear,
+    }
+}
+
+/// The actions that are not clearly below the best.
+fn tied(row: &[f64], scale: f64) -> Vec<usize> {
+    (0..row.len()).filter(|&a| gap(row, a, scale) != Gap::Real).collect()
+}
+
+/// Whether the greedy sets of a state are equal; `None` if that cannot be said.
+fn compare(row: &[f64], scale: f64, shaped: &[f64], scale_shaped: f64) -> Option<bool> {
+    let best = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut equal = Some(true);
+    for a in 0..row.len() {
+        match (gap(row, a, scale), gap(shaped, a, scale_shaped)) {
+            (Gap::Tie, Gap::Tie) | (Gap::Real, Gap::Real) => {}
+            (Gap::Tie, Gap::Real) => return Some(false),
+            // Had the shaping kept the gap, would it have been seen?
+            (Gap::Real, Gap::Tie) if best - row[a] >= 1e-8 * scale_shaped => return Some(false),
+            _ => equal = None,
+        }
+    }
+    equal
 }
 
 #[cfg(test)]
@@ -150,9 +181,33 @@ mod tests {
     fn a_gap_near_the_tolerance_is_inconclusive() {
         let mdp = choice();
         let near = mdp.with_rewards(|_, a, _| if a == 0 { 1.0 } else { 1.0 - 1e-10 });
-        assert_eq!(
-            preservation(&near, &near, 1.0, &[0.0; 3]).unwrap().verdict,
-            Verdict::Inconclusive
-        );
+        let verdict = preservation(&near, &near, 1.0, &[0.0; 3]).unwrap().verdict;
+        assert_eq!(verdict, Verdict::Inconclusive);
+    }
+
+    #[test]
+    fn a_potential_that_drowns_the_rewards_is_inconclusive() {
+        let mdp = choice();
+        for (size, expected) in [
+            (1e3, Verdict::Preserved),
+            (1e6, Verdict::Preserved),
+            (1e8, Verdict::Inconclusive),
+            (1e10, Verdict::Inconclusive),
+            (1e17, Verdict::Inconclusive),
+        ] {
+            let phi = [size, 0.0, 0.0];
+            let result = preservation(&mdp, &shaped_model(&mdp, 1.0, &phi), 1.0, &phi).unwrap();
+            assert_eq!(result.verdict, expected, "potential of {size}");
+        }
+    }
+
+    #[test]
+    fn positive_scaling_preserves_whatever_the_factor() {
+        let mdp = choice();
+        for k in [1e-12, 1e-6, 1.0, 1e6, 1e12] {
+            let scaled = mdp.with_rewards(|_, _, o| k * o.reward);
+            let result = preservation(&mdp, &scaled, 1.0, &[0.0; 3]).unwrap();
+            assert_eq!(result.verdict, Verdict::Preserved, "times {k}");
+        }
     }
 }

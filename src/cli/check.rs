@@ -1,7 +1,7 @@
 //! `runner check SCRIPT..`
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
 
@@ -9,7 +9,7 @@ use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::check;
 use crate::report::claims::rehearse;
-use crate::script::{Callback, DiscretiserSpec, PhiOn, Plan, Variant, load};
+use crate::script::{Callback, Diagnostic, DiscretiserSpec, PhiOn, Plan, Variant, load};
 
 #[derive(Debug, ClapArgs)]
 pub(super) struct Args {
@@ -22,14 +22,12 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut last = None;
     for script in &args.scripts {
-        match load(script)
-            .and_then(|plan| check(&plan).and_then(|()| rehearse(&plan)).map(|()| plan))
-        {
-            Ok(plan) => {
+        match checked(script) {
+            Ok((plan, printed)) => {
                 for warning in &plan.warnings {
                     diagnostic(warning);
                 }
-                for line in &plan.printed {
+                for line in plan.printed.iter().chain(&printed) {
                     note(line);
                 }
                 out(&describe(&plan))?;
@@ -45,6 +43,14 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         Some(d) => Err(d.into()),
         None => Ok(Outcome::Fine),
     }
+}
+
+/// A script's plan, and what its callbacks printed while they were tried out.
+fn checked(script: &Path) -> Result<(Plan, Vec<String>), Diagnostic> {
+    let plan = load(script)?;
+    let printed = check(&plan)?;
+    rehearse(&plan)?;
+    Ok((plan, printed))
 }
 
 const MEMORY: &str = "writing to a string does not fail";
@@ -67,6 +73,9 @@ fn describe(plan: &Plan) -> String {
         for (what, how) in rows(variant) {
             writeln!(text, "    {what:<12} {how}").expect(MEMORY);
         }
+    }
+    if let Some(baseline) = &plan.baseline {
+        writeln!(text, "  baseline: {baseline}").expect(MEMORY);
     }
     for expectation in &plan.expectations {
         writeln!(text, "  expects: {}", expectation.text).expect(MEMORY);
@@ -101,6 +110,14 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     let seeds = counted(v.seeds.0.len(), "seed");
     let episodes = counted(v.episodes as usize, "episode");
     rows.push(("training", format!("{seeds} × {episodes} {limit}")));
+    let solved = v.threshold.map_or(String::new(), |x| format!(", solved at {x}"));
+    rows.push((
+        "measured",
+        format!("rolling mean over {}{solved}", counted(v.window as usize, "episode")),
+    ));
+    if let Some(notes) = &v.notes {
+        rows.push(("notes", notes.clone()));
+    }
     if let Some(potential) = &v.potential {
         let on = match (&v.discretiser, v.potential_on) {
             (DiscretiserSpec::StateIndex, _) => "tabulated over the states",

@@ -13,6 +13,7 @@ use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::{Audit, ExecuteError, Execution, Progress, audit_variant, check, execute};
 use crate::report::claims::{judge, rehearse};
+use crate::report::compare::against_baseline;
 use crate::report::results::{Findings, FolderError, Results};
 use crate::report::table::{StudyTable, TableRow};
 use crate::script::{Host, Plan, SeedList, load};
@@ -45,13 +46,23 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut plan = load(&args.script)?;
     restrict(&mut plan, args);
     say(&plan, args.quiet);
-    check(&plan)?;
+    for line in check(&plan)? {
+        note(&line);
+    }
     rehearse(&plan)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("results").join(&plan.name));
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let jobs = args.jobs.map_or(cores, usize::from);
     let results = Results::open(&folder, &plan, jobs, args.fresh)
         .map_err(|FolderError { message, hint }| Failure::Message(message, hint))?;
+    if let Some(other) = &results.replaces
+        && !args.quiet
+    {
+        note(&format!(
+            "{} held the results of {other}: its units stay, its tables and plots are replaced",
+            folder.display()
+        ));
+    }
     let Some(execution) = train(&plan, &results, jobs, args)? else { return Ok(Outcome::Stopped) };
     let host = Host::open(&plan)?;
     let audits: Vec<Audit> =
@@ -186,10 +197,16 @@ fn table(plan: &Plan, findings: &Findings) -> StudyTable {
     let rows = findings.summaries.iter().enumerate().map(|(i, summary)| {
         TableRow::new(summary, findings.steps_per_second[i], findings.audits[i].label())
     });
-    let windows = plan.variants.iter().map(|v| v.window).max().unwrap_or(1);
-    let notes = vec![format!(
-        "final: native return, rolling mean over {windows} episodes at the end of training"
-    )];
+    let mut windows: Vec<u32> = plan.variants.iter().map(|v| v.window).collect();
+    windows.sort_unstable();
+    windows.dedup();
+    let over = match windows[..] {
+        [1] => "native return of the last episode".to_string(),
+        [n] => format!("native return, rolling mean over the last {n} episodes"),
+        _ => "native return, rolling mean over each variant's own window".to_string(),
+    };
+    let mut notes = vec![format!("final: {over} of training, exploration included")];
+    notes.extend(against_baseline(plan, &findings.summaries));
     StudyTable { rows: rows.collect(), notes }
 }
 
@@ -204,8 +221,11 @@ fn expectations(
     for (text, holds) in judge(plan, host, findings)? {
         all &= holds;
         if !quiet || !holds {
-            note(&format!("{} {text}", if holds { "ok    " } else { "FAILED" }));
+            out(&format!("{} {text}\n", if holds { "ok    " } else { "FAILED" }))?;
         }
+    }
+    for line in host.printed() {
+        note(&line);
     }
     Ok(all)
 }

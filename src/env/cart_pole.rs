@@ -46,7 +46,7 @@ use serde_json::{Map, Value};
 use super::bounds;
 use super::error::{EnvError, did_you_mean};
 use super::kwargs::{KwargKind, KwargSpec, Kwargs};
-use super::registered::Registered;
+use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Env, Field, FieldKind, Schema, Step};
@@ -207,6 +207,11 @@ impl Env for CartPole {
 
 impl Registered for CartPole {
     const SUMMARY: &'static str = "balance a pole on a cart: 1 per step until it falls";
+
+    const EXAMPLE: Example = Example {
+        potential: "-20.0 * abs(s.theta) - 2.0 * abs(s.theta_dot + 4.0 * s.theta)",
+        bins: "x: [-2.4, 2.4, 12], x_dot: [-3.0, 3.0, 12], theta: [-0.5, 0.5, 24], theta_dot: [-2.0, 2.0, 24]",
+    };
 
     const KWARGS: &'static [KwargSpec] = &[KwargSpec {
         name: "sutton_barto_reward",

@@ -42,7 +42,7 @@ use std::sync::Arc;
 
 use super::error::EnvError;
 use super::kwargs::{KwargKind, KwargSpec, Kwargs};
-use super::registered::Registered;
+use super::registered::{Example, Registered};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{
     Action, Env, Field, FieldKind, FiniteEnv, FiniteMdp, FiniteState, Grid, Outcome, Schema, Step,
@@ -307,6 +307,11 @@ impl Env for FrozenLake {
 
 impl Registered for FrozenLake {
     const SUMMARY: &'static str = "cross slippery ice to a goal without falling into a hole";
+
+    const EXAMPLE: Example = Example {
+        potential: "1.0 - 0.05 * (abs(s.row - s.goal_row) + abs(s.col - s.goal_col))",
+        bins: "",
+    };
 
     const KWARGS: &'static [KwargSpec] = &[
         KwargSpec {

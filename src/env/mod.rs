@@ -23,6 +23,6 @@ mod session;
 
 pub use error::EnvError;
 pub use kwargs::{KwargKind, KwargSpec, Kwargs};
-pub use registered::{Observation, Registered};
+pub use registered::{Example, Observation, Registered};
 pub use registry::{AnyEnv, EnvSpec, EnvVisitor, find, make, specs};
 pub use session::{Session, SessionStep, time_limit};

@@ -39,7 +39,7 @@ use serde_json::{Map, Value};
 use super::bounds;
 use super::error::EnvError;
 use super::kwargs::{KwargKind, KwargSpec, Kwargs};
-use super::registered::Registered;
+use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Env, Field, FieldKind, Schema, Step};
@@ -144,6 +144,11 @@ impl Env for MountainCar {
 
 impl Registered for MountainCar {
     const SUMMARY: &'static str = "swing a weak car up a hill: -1 per step until it is there";
+
+    const EXAMPLE: Example = Example {
+        potential: "80.0 * (abs(s.velocity) / 0.07 - 1.0)",
+        bins: "position: [-1.2, 0.6, 40], velocity: [-0.07, 0.07, 40]",
+    };
 
     const KWARGS: &'static [KwargSpec] = &[KwargSpec {
         name: "goal_velocity",

@@ -31,6 +31,15 @@ impl From<FiniteState> for Observation {
     }
 }
 
+/// What `runner new` writes, and suggestions show: sensible, not tuned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Example {
+    /// The body of a potential `|s|` that helps a tabular learner.
+    pub potential: &'static str,
+    /// The map for `bins`, empty on finite environments.
+    pub bins: &'static str,
+}
+
 /// An environment that can be made from an id and arguments.
 pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
     /// One line for `list`.
@@ -38,6 +47,9 @@ pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
 
     /// The constructor's arguments.
     const KWARGS: &'static [KwargSpec];
+
+    /// What a first script for it may say.
+    const EXAMPLE: Example;
 
     /// The reset options it knows.
     const RESET_OPTIONS: &'static [&'static str] = &[];

@@ -11,7 +11,7 @@ use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
 use super::mountain_car::MountainCar;
-use super::registered::{Observation, Registered};
+use super::registered::{Example, Observation, Registered};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Env, FiniteMdp, Schema};
 
@@ -26,6 +26,8 @@ pub struct EnvSpec {
     pub reward_threshold: Option<f64>,
     /// One line for `list`.
     pub summary: &'static str,
+    /// What a first script for it may say.
+    pub example: Example,
     /// The reset options it knows.
     pub reset_options: &'static [&'static str],
     /// The attributes that may be set before the first reset.
@@ -179,6 +181,7 @@ macro_rules! environments {
                 max_steps: $steps,
                 reward_threshold: $threshold,
                 summary: <$type as Registered>::SUMMARY,
+                example: <$type as Registered>::EXAMPLE,
                 reset_options: <$type as Registered>::RESET_OPTIONS,
                 attributes: <$type as Registered>::ATTRIBUTES,
                 declared: <$type as Registered>::KWARGS,

@@ -132,6 +132,52 @@ fn tabulate<E: Env>(
     })
 }
 
+/// A reward that is not a function of the transition: what it depends on besides.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NotAModel(pub(super) &'static str);
+
+impl NotAModel {
+    fn fault(self, variant: &Variant) -> Fault {
+        let callback = variant.reward.as_ref().or_else(|| variant.terms.values().next());
+        let d = Diagnostic::error(self.to_string())
+            .at(callback.and_then(|r| r.place.clone()))
+            .hint("a model cannot hold it; plan without it");
+        Fault(Box::new(NotAModelError { what: self, diagnostic: d }))
+    }
+}
+
+impl std::fmt::Display for NotAModel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "the reward depends on `{}`: it is not a function of the transition", self.0)
+    }
+}
+
+/// [`NotAModel`] as an error, with the diagnostic to show where it is one.
+#[derive(Debug)]
+pub(super) struct NotAModelError {
+    pub(super) what: NotAModel,
+    pub(super) diagnostic: Diagnostic,
+}
+
+impl std::fmt::Display for NotAModelError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.diagnostic.fmt(f)
+    }
+}
+
+impl std::error::Error for NotAModelError {}
+
+/// A fault's diagnostic.
+pub(super) fn diagnostic_of(fault: Fault) -> Diagnostic {
+    match fault.0.downcast::<Diagnostic>() {
+        Ok(d) => *d,
+        Err(other) => match other.downcast::<NotAModelError>() {
+            Ok(e) => e.diagnostic,
+            Err(other) => Diagnostic::error(other.to_string()),
+        },
+    }
+}
+
 /// The model that a finite variant's agent learns on.
 pub(super) struct LearnedModel {
     /// The dynamics with the learned rewards, the potential's included.
@@ -153,6 +199,9 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
     let reachable = mdp.reachable();
     let base = match reward(host, variant, env)? {
         AnyReward::Native(_) => (**mdp).clone(),
+        AnyReward::Tabulated(table) if table.depends_on_truncation() => {
+            return Err(NotAModel("t.truncated").fault(variant));
+        }
         AnyReward::Tabulated(table) => {
             let mut outcome = 0;
             mdp.with_rewards(|_, _, _| {
@@ -160,14 +209,7 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
                 table.of(outcome - 1)
             })
         }
-        AnyReward::Scripted(_) => {
-            let place = variant.reward.as_ref().and_then(|r| r.place.clone());
-            let d =
-                Diagnostic::error("the reward reads `t.step`: it is not a function of the state")
-                    .at(place)
-                    .hint("a model cannot hold it; plan or audit without it");
-            return Err(Fault(Box::new(d)));
-        }
+        AnyReward::Scripted(_) => return Err(NotAModel("t.step").fault(variant)),
     };
     let mut phi = vec![0.0; mdp.n_states()];
     let mut potential = potential(host, variant, env, mdp.n_states())?;

@@ -2,11 +2,12 @@
 
 use serde::Serialize;
 
-use super::assemble::learned_model;
+use super::assemble::{NotAModelError, diagnostic_of, learned_model};
 use crate::audit::{Preservation, Verdict, preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
 use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+use crate::shaping::Fault;
 
 /// The verdict on a variant's shaping.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -103,15 +104,14 @@ impl EnvVisitor for Judge<'_> {
         };
         let model = match learned_model(host, variant, &env) {
             Ok(model) => model,
-            Err(fault) => {
-                let d = fault.0.downcast::<Diagnostic>();
-                let d = d.map_or_else(|e| Diagnostic::error(e.to_string()), |d| *d);
-                // A reward that reads `t.step` has no model, which is an answer, not a mistake.
-                if d.message.contains("t.step") {
-                    return Ok(Audit::new("not checked", None, "the reward reads `t.step`"));
+            // A reward without a model is an answer, not a mistake.
+            Err(fault) => match fault.0.downcast::<NotAModelError>() {
+                Ok(e) => return Ok(Audit::new("not checked", None, &e.what.to_string())),
+                Err(other) => {
+                    let d = diagnostic_of(Fault(other));
+                    return Err(d.note(format!("in variant `{}`", variant.name)));
                 }
-                return Err(d.note(format!("in variant `{}`", variant.name)));
-            }
+            },
         };
         let plain = env.finite().expect("StateIndex is given to finite environments only");
         let gamma = variant.agent.float("gamma");

@@ -10,11 +10,11 @@ const EPISODES: u32 = 5;
 const STEPS: u32 = 200;
 
 /// Plays a few short episodes of every variant, so that every callback is called on states that
-/// occur; on finite environments on all of them.
+/// occur; on finite environments on all of them. Returns what they printed.
 ///
 /// # Errors
 /// The first mistake found.
-pub fn check(plan: &Plan) -> Result<(), Diagnostic> {
+pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
     let host = Host::open(plan)?;
     for variant in &plan.variants {
         let scripted = variant.potential.is_some()
@@ -35,5 +35,5 @@ pub fn check(plan: &Plan) -> Result<(), Diagnostic> {
             Err(UnitError::Script(d)) => return Err(*d),
         }
     }
-    Ok(())
+    Ok(host.printed())
 }

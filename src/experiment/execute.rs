@@ -102,7 +102,9 @@ pub fn execute(
         if failed.as_ref().is_none_or(|(first, _)| i < *first) {
             *failed = Some((i, error));
         }
-        progress.stop.store(true, Ordering::Relaxed);
+        // No further units; those under way go on, so that the error of the first failing unit is
+        // reported, whichever thread was faster.
+        next.store(usize::MAX / 2, Ordering::Relaxed);
     };
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, todo.len().max(1)) {

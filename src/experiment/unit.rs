@@ -62,10 +62,7 @@ pub enum UnitError {
 
 impl UnitError {
     fn fault(variant: &Variant, seed: u64, fault: Fault) -> Self {
-        let d = match fault.0.downcast::<Diagnostic>() {
-            Ok(d) => *d,
-            Err(other) => Diagnostic::error(other.to_string()),
-        };
+        let d = assemble::diagnostic_of(fault);
         Self::Script(Box::new(d.note(format!("in variant `{}`, seed {seed}", variant.name))))
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::planning::{PlannedAgent, Planner, ValueIteration};
-use super::{Agent, QLearning, QTable, RandomAgent, Sarsa, Schedule};
+use super::{Agent, QLearning, QTable, RandomAgent, Sarsa, Schedule, Unit};
 use crate::mdp::streams::Stream;
 
 /// The value of an agent's parameter.
@@ -27,13 +27,21 @@ impl std::fmt::Display for ParamValue {
             Self::Int(n) => write!(f, "{n}"),
             Self::Float(x) => write!(f, "{x:?}"),
             Self::Schedule(Schedule::Constant { value }) => write!(f, "{value:?}"),
-            Self::Schedule(Schedule::Linear { start, end, over, .. }) => {
-                write!(f, "linear({start:?}, {end:?}, {over})")
+            Self::Schedule(Schedule::Linear { start, end, over, unit }) => {
+                write!(f, "linear({start:?}, {end:?}, {over}{})", steps(*unit))
             }
-            Self::Schedule(Schedule::Exponential { start, factor, min, .. }) => {
-                write!(f, "exponential({start:?}, {factor:?}, {min:?})")
+            Self::Schedule(Schedule::Exponential { start, factor, min, unit }) => {
+                write!(f, "exponential({start:?}, {factor:?}, {min:?}{})", steps(*unit))
             }
         }
+    }
+}
+
+/// The option of a schedule that goes by steps.
+fn steps(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Episode => "",
+        Unit::Step => ", #{ steps: true }",
     }
 }
 

@@ -41,8 +41,9 @@ const ALL_POINTS: usize = 5000;
 pub struct CurvesPlot {
     /// The study's name.
     pub title: String,
-    /// The window of the rolling means, in episodes: named in the subtitle.
-    pub window: usize,
+    /// The window of the rolling means, in episodes: named in the subtitle. `None` if the curves
+    /// have windows of their own.
+    pub window: Option<usize>,
     /// The return that counts as solved: a dashed line, if given.
     pub threshold: Option<f64>,
     /// One per variant, in the order of the legend.
@@ -121,8 +122,9 @@ fn subtitle(plot: &CurvesPlot) -> String {
         _ => format!("{fewest} to {most} seeds"),
     };
     match plot.window {
-        1 => subtitle.push_str(", every episode"),
-        n => {
+        None => subtitle.push_str(", rolling means with windows of their own"),
+        Some(1) => subtitle.push_str(", every episode"),
+        Some(n) => {
             let _ = write!(subtitle, ", rolling mean over {n} episodes");
         }
     }
@@ -156,7 +158,7 @@ fn value_range(plot: &CurvesPlot) -> (f64, f64, Option<String>) {
     // An early plunge (falling off the cliff while exploring) would press all that follows into
     // a line: leave it out, and say so. It stays in the rolling means for a window.
     let last = plot.curves.iter().filter_map(|c| c.band.episode.last()).max().map_or(0, |&n| n);
-    let start = (last / 10).max(2 * plot.window).min(last / 4);
+    let start = (last / 10).max(2 * plot.window.unwrap_or(1)).min(last / 4);
     let (later_low, later_high) = lines_range(plot, start);
     let later = later_high - later_low;
     if later > 0.0 && later < 0.2 * (highest - lowest) {

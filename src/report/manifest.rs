@@ -23,10 +23,13 @@ pub fn circumstance(jobs: usize) -> Value {
     })
 }
 
-/// Without the folder: where a script lies does not change what it does.
+/// A script's name without its folder: where it lies does not change what it does.
+pub(super) fn file_name(source: &Source) -> &str {
+    source.name.rsplit(['/', '\\']).next().unwrap_or(&source.name)
+}
+
 fn source(source: &Source) -> Value {
-    let name = source.name.rsplit(['/', '\\']).next();
-    json!({ "name": name, "sha256": source.sha256() })
+    json!({ "name": file_name(source), "sha256": source.sha256() })
 }
 
 /// The manifest of `plan`.

@@ -4,12 +4,14 @@
 //! - [`claims`]: what a study expects of its results
 //! - [`manifest`] writes `study.json`
 //! - [`summary`]: per-variant statistics, as in `summary.json`
+//! - [`compare`]: variants against the baseline
 //! - [`curves`]: learning curves as SVG
 //! - [`table`]: the closing table in the terminal
 //! - `legend`: the legend of the curves
 //! - `svg`: scales, ticks and escaping for hand-written SVG
 
 pub mod claims;
+pub mod compare;
 pub mod curves;
 mod legend;
 pub mod manifest;

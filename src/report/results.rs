@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::curves::{Curve, CurvesPlot, curves_svg};
-use super::manifest::manifest;
+use super::manifest::{file_name, manifest};
 use super::summary::{VariantSummary, summarise};
 use crate::experiment::{
     Audit, Execution, Store, StoreError, Unit, units, write_atomically, write_atomically_with,
@@ -21,6 +21,8 @@ pub struct Results {
     pub folder: PathBuf,
     /// Its units.
     pub store: Store,
+    /// The script whose results of the same name were here before, if it was another.
+    pub replaces: Option<String>,
 }
 
 /// Why a folder cannot hold a study's results.
@@ -60,7 +62,7 @@ impl Results {
     /// # Panics
     /// Never: the manifest is plain data.
     pub fn open(folder: &Path, plan: &Plan, jobs: usize, fresh: bool) -> Result<Self, FolderError> {
-        owned_by(folder, plan)?;
+        let replaces = owned_by(folder, plan)?;
         if let Some(name) = plan.sources.imports.keys().find(|name| is_ours(name)) {
             return Err(FolderError {
                 message: format!("the imported file `{name}` has the name of one of the results"),
@@ -91,7 +93,7 @@ impl Results {
                 store.remove(&unit)?;
             }
         }
-        Ok(Self { folder: folder.to_path_buf(), store })
+        Ok(Self { folder: folder.to_path_buf(), store, replaces })
     }
 
     /// Writes every derived file: `timing.json`, `episodes.csv`, `summary.json`, `summary.csv`,
@@ -141,9 +143,10 @@ impl Results {
         self.summary(plan, &summaries, &audits)?;
         let first = &plan.variants[0];
         let shared = plan.variants.iter().all(|v| v.threshold == first.threshold);
+        let same_window = plan.variants.iter().all(|v| v.window == first.window);
         let plot = CurvesPlot {
             title: plan.name.clone(),
-            window: first.window as usize,
+            window: same_window.then_some(first.window as usize),
             threshold: first.threshold.filter(|_| shared),
             curves,
         };
@@ -209,8 +212,9 @@ pub fn variant_json(summary: &VariantSummary, audit: &Audit) -> Value {
     value
 }
 
-/// Refuses a folder that holds another study or something else altogether.
-fn owned_by(folder: &Path, plan: &Plan) -> Result<(), FolderError> {
+/// Refuses a folder that holds another study or something else altogether; returns the name of the
+/// script that a study of the same name came from, if it was another.
+fn owned_by(folder: &Path, plan: &Plan) -> Result<Option<String>, FolderError> {
     let refuse = |message: String| {
         Err(FolderError {
             message: format!("{}: {message}", folder.display()),
@@ -229,11 +233,14 @@ fn owned_by(folder: &Path, plan: &Plan) -> Result<(), FolderError> {
         return if occupied {
             refuse("is not empty and not a results folder".into())
         } else {
-            Ok(())
+            Ok(None)
         };
     };
     match serde_json::from_slice::<Value>(&bytes) {
-        Ok(old) if old["study"] == plan.name.as_str() => Ok(()),
+        Ok(old) if old["study"] == plan.name.as_str() => {
+            let name = old["identity"]["script"]["name"].as_str().map(str::to_string);
+            Ok(name.filter(|name| *name != file_name(&plan.sources.script)))
+        }
         Ok(old) => refuse(format!(
             "holds the results of the study {}, not of \"{}\"",
             old["study"], plan.name

@@ -122,6 +122,17 @@ impl Host {
         self.callbacks.annotate(diagnostic)
     }
 
+    /// What callbacks have printed since this was last asked: the first lines of it.
+    pub fn printed(&self) -> Vec<String> {
+        const SHOWN: usize = 20;
+        let mut lines = std::mem::take(&mut *self.callbacks.context.printed.borrow_mut());
+        if lines.len() > SHOWN {
+            lines.truncate(SHOWN);
+            lines.push("… (further output of callbacks is not shown)".into());
+        }
+        lines
+    }
+
     /// The script's functions.
     pub fn callbacks(&self) -> &Rc<Callbacks> {
         &self.callbacks

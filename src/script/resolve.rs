@@ -192,7 +192,7 @@ impl Resolver<'_> {
                 agent.value.spec.name, spec.id
             ))
             .at(agent.spot.place())
-            .hint(format!("add, for example, `discretiser: {}`", example_bins(schema)))),
+            .hint(format!("add, for example, `discretiser: {}`", example_bins(spec)))),
             Some(d) => match &d.value {
                 DiscretiserDraft::Bins(bins) => dims(bins, schema, spec)
                     .map(DiscretiserSpec::Bins)
@@ -390,13 +390,7 @@ fn dims(bins: &[BinDraft], schema: &Schema, spec: &EnvSpec) -> Result<Vec<Dim>, 
     Ok(dims)
 }
 
-/// Bins to suggest: every field, over its declared range or, where that is infinite, ±3.
-fn example_bins(schema: &Schema) -> String {
-    let fields = schema.fields.iter().map(|f| {
-        // Bounds are single-precision numbers: as such they are short.
-        let lo = if f.low.is_finite() { f.low as f32 } else { -3.0 };
-        let hi = if f.high.is_finite() { f.high as f32 } else { 3.0 };
-        format!("{}: [{lo:?}, {hi:?}, 12]", f.name)
-    });
-    format!("bins(#{{ {} }})", fields.collect::<Vec<_>>().join(", "))
+/// Bins to suggest.
+fn example_bins(spec: &EnvSpec) -> String {
+    format!("bins(#{{ {} }})", spec.example.bins)
 }

@@ -153,8 +153,23 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     engine.register_indexer_set(|_: &mut StepView, name: &str, _: Dynamic| {
         fail::<()>(Diagnostic::error(format!("steps are read-only: `{name}` cannot be assigned")))
     });
-    engine.register_indexer_get(|_: &mut StepView, name: &str| {
-        let diagnostic = Diagnostic::error(format!("a step has no field `{name}`"));
-        fail::<Dynamic>(diagnostic.maybe_hint(suggest(name, STEP_FIELDS)))
+    let step_read = context.step_read.clone();
+    engine.register_indexer_get(move |t: &mut StepView, name: &str| {
+        Ok(match name {
+            "state" => Dynamic::from(t.state.clone()),
+            "action" => t.action.into(),
+            "reward" => t.reward.into(),
+            "next_state" => Dynamic::from(t.next_state.clone()),
+            "terminated" => t.terminated.into(),
+            "truncated" => t.truncated.into(),
+            "step" => {
+                step_read.set(true);
+                t.step.into()
+            }
+            _ => {
+                let diagnostic = Diagnostic::error(format!("a step has no field `{name}`"));
+                return fail(diagnostic.maybe_hint(suggest(name, STEP_FIELDS)));
+            }
+        })
     });
 }

@@ -71,10 +71,10 @@ impl TabulatedReward {
         for s in 0..mdp.n_states() {
             for a in 0..mdp.n_actions() {
                 for i in mdp.range(s, a) {
-                    for truncated in [false, true] {
+                    for cut in [false, true] {
+                        let row = (2 * i + usize::from(cut)) * width;
                         // A terminal step is reported as terminated only.
-                        let truncated = truncated && !mdp.outcomes()[i].terminated;
-                        let row = (2 * i + usize::from(truncated)) * width;
+                        let truncated = cut && !mdp.outcomes()[i].terminated;
                         let mut terms = vec![0.0; n_terms];
                         table[row] = reward(s, a, i, truncated, &mut terms)?;
                         table[row + 1..row + width].copy_from_slice(&terms);
@@ -88,6 +88,12 @@ impl TabulatedReward {
     /// The reward of an outcome that the time limit does not cut off.
     pub fn of(&self, outcome: usize) -> f64 {
         self.table[2 * outcome * (1 + self.n_terms)]
+    }
+
+    /// Whether being cut off by the time limit changes a reward.
+    pub fn depends_on_truncation(&self) -> bool {
+        let width = 1 + self.n_terms;
+        self.table.chunks_exact(2 * width).any(|pair| pair[..width] != pair[width..])
     }
 
     /// Reads the row of `outcome`, adding the terms to their sums.

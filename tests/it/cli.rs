@@ -123,7 +123,7 @@ fn an_expectation_decides_the_exit_code() {
     let script = write(dir.path(), "s.rhai", &format!("{}{claims}", SMALL.trim_end()));
     let output = exec(&script, &out, &[]);
     expect_code(&output, 1);
-    assert!(stderr(&output).contains("ok     true") && stderr(&output).contains("FAILED false"));
+    assert!(stdout(&output).contains("ok     true") && stdout(&output).contains("FAILED false"));
 }
 
 #[test]
@@ -302,4 +302,32 @@ fn a_closed_pipe_is_no_error() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(stderr(&output), "");
     expect_code(&output, 0);
+}
+
+#[test]
+fn rewards_without_a_model_are_not_judged_and_drowned_potentials_are_inconclusive() {
+    let dir = folder();
+    let script = r#"
+        let plain = experiment(#{
+            name: "plain", env: "FrozenLake-v1", agent: q_learning(), episodes: 5, seeds: 1,
+        });
+        [
+            plain.with(#{ name: "step", terms: #{ x: |t| if t.step > 3 { 1.0 } else { 0.0 } } }),
+            plain.with(#{ name: "cut", terms: #{ x: |t| if t.truncated { 5.0 } else { 0.0 } } }),
+            plain.with(#{ name: "large", potential: |s| 1e10 * s.col }),
+            plain.with(#{ name: "scaled", reward: |t| 1e-12 * t.reward }),
+        ]
+    "#;
+    let script = write(dir.path(), "judged.rhai", script);
+    let out = dir.path().join("results");
+    expect_code(&exec(&script, &out, &[]), 0);
+    let summary: serde_json::Value =
+        serde_json::from_slice(&contents(&out)["summary.json"]).unwrap();
+    let verdicts: Vec<&str> = summary["variants"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v["audit"]["verdict"].as_str().unwrap())
+        .collect();
+    assert_eq!(verdicts, ["not checked", "not checked", "inconclusive", "policy preserved"]);
 }

@@ -172,7 +172,7 @@ fn schedules_and_discretisers_as_written() {
         &[],
     );
     let params = &plan.variants[0].agent.params;
-    assert_eq!(params["epsilon"].to_string(), "linear(1.0, 0.1, 50)");
+    assert_eq!(params["epsilon"].to_string(), "linear(1.0, 0.1, 50, #{ steps: true })");
     assert_eq!(params["alpha"].to_string(), "exponential(1.0, 0.5, 0.1)");
     let bins = |i: usize| match &plan.variants[i].discretiser {
         DiscretiserSpec::Bins(dims) => {

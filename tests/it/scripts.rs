@@ -52,7 +52,7 @@ fn shown(d: &Diagnostic, script: &Path) -> String {
 
 /// What loading and checking the script says.
 fn actual(script: &Path) -> String {
-    match load(script).and_then(|plan| check(&plan).and_then(|()| rehearse(&plan)).map(|()| plan)) {
+    match load(script).and_then(|plan| check(&plan).and_then(|_| rehearse(&plan)).map(|()| plan)) {
         Ok(plan) => plan.warnings.iter().map(|d| shown(d, script)).collect(),
         Err(d) => shown(&d, script),
     }

@@ -131,6 +131,9 @@ pub fn replay(reader: impl BufRead) -> Result<ParityReport, RecordingError> {
         Comparison { line, episode: &episode, step: 0, report: &mut report }.run(&mut session)?;
         report.episodes += 1;
     }
+    if report.episodes == 0 {
+        return Err(RecordingError::new(2, "the recording has no episodes"));
+    }
     Ok(report)
 }
 

@@ -37,7 +37,9 @@ impl StoreError {
     }
 
     fn io(path: &Path, what: &str, error: &io::Error) -> Self {
-        Self::new(path, format!("{what}: {error}"))
+        // Without the name of a temporary file, which says nothing to anybody.
+        let text = error.to_string();
+        Self::new(path, format!("{what}: {}", text.split(" at path ").next().unwrap_or(&text)))
     }
 }
 

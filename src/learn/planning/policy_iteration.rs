@@ -22,10 +22,12 @@ impl PolicyIteration {
     /// If a policy met on the way has no value (γ = 1 and it may never end).
     pub fn solve(&self, mdp: &FiniteMdp) -> Result<QTable, PolicyValueError> {
         let mut policy = vec![0; mdp.n_states()];
+        let rewards = mdp.outcomes().iter().map(|o| o.reward.abs());
+        let largest_reward = rewards.fold(0.0, f64::max);
         loop {
             let v = policy_value(mdp, self.gamma, &policy)?;
             let q = q_from_v(mdp, self.gamma, &v);
-            let scale = v.iter().fold(1.0f64, |m, x| m.max(x.abs()));
+            let scale = v.iter().fold(largest_reward, |m, x| m.max(x.abs()));
             let mut improved = false;
             for (s, current) in policy.iter_mut().enumerate() {
                 let row = q.row(s);
