@@ -14,7 +14,7 @@
 //! | [`stats`] | IQM, intervals, rolling means |
 //! | [`learn`] | agents and planners |
 //! | [`shaping`] | rewards, potentials, discretisers |
-//! | [`env`] | the environments and their registry |
+//! | [`mod@env`] | the environments and their registry |
 //! | [`mdp`] | actions, steps, models, random streams, pinned mathematics |
 
 pub mod audit;

@@ -19,12 +19,14 @@ mod random_agent;
 pub mod registry;
 mod sarsa;
 mod schedule;
+mod tabular;
 
 pub use agent::{Agent, Last};
 pub use greedy::{Behaviour, argmax_tol, greedy_set, greedy_sets};
-pub use q_learning::{QLearning, q_learning_td_error};
+pub use q_learning::QLearning;
 pub use q_table::QTable;
 pub use random_agent::RandomAgent;
 pub use registry::{AgentConfig, AgentSpec, AnyAgent, ParamValue};
-pub use sarsa::{Sarsa, sarsa_td_error};
+pub use sarsa::Sarsa;
 pub use schedule::{Schedule, ScheduleState, Unit};
+pub use tabular::td_error;

@@ -5,69 +5,47 @@
 //! The book's order: choose A from S, observe R and S′, update, and only then choose the next
 //! action, from the updated values.
 
-use super::{Agent, Behaviour, Last, QTable, Schedule, ScheduleState};
+use super::tabular::Tabular;
+use super::{Agent, Last, QTable, Schedule};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
-/// `R + γ max_a Q(S′, a) − Q(S, A)`; pass 0 as `max_next` where S′ is terminal.
-#[inline]
-pub fn q_learning_td_error(q: f64, reward: f64, gamma: f64, max_next: f64) -> f64 {
-    reward + gamma * max_next - q
-}
-
 /// Tabular Q-learning, ε-greedy.
 #[derive(Debug, Clone)]
-pub struct QLearning {
-    q: QTable,
-    gamma: f64,
-    alpha: ScheduleState,
-    behaviour: Behaviour,
-    s: usize,
-    a: Action,
-}
+pub struct QLearning(Tabular);
 
 impl QLearning {
     /// A learner with the table `q`; exploration draws from `stream`.
     pub fn new(q: QTable, gamma: f64, alpha: Schedule, epsilon: Schedule, stream: Stream) -> Self {
-        let behaviour = Behaviour::new(epsilon, stream);
-        Self { q, gamma, alpha: ScheduleState::new(alpha), behaviour, s: 0, a: 0 }
-    }
-
-    #[inline]
-    fn update(&mut self, reward: f64, max_next: f64) {
-        let q = self.q.get_mut(self.s, self.a);
-        *q += self.alpha.value() * q_learning_td_error(*q, reward, self.gamma, max_next);
-        self.alpha.step();
+        Self(Tabular::new(q, gamma, alpha, epsilon, stream))
     }
 }
 
 impl Agent for QLearning {
     #[inline]
     fn begin(&mut self, s: usize) -> Action {
-        self.s = s;
-        self.a = self.behaviour.choose(self.q.row(s));
-        self.a
+        let a = self.0.choose(s);
+        self.0.play(s, a)
     }
 
     #[inline]
     fn step(&mut self, reward: f64, next: usize) -> Action {
-        let max_next = self.q.max(next);
-        self.update(reward, max_next);
+        let max_next = self.0.q.max(next);
+        self.0.update(reward, max_next);
         self.begin(next)
     }
 
     fn end(&mut self, reward: f64, last: Last) {
         let max_next = match last {
             Last::Terminated => 0.0,
-            Last::Truncated(next) => self.q.max(next),
+            Last::Truncated(next) => self.0.q.max(next),
         };
-        self.update(reward, max_next);
-        self.alpha.end_episode();
-        self.behaviour.end_episode();
+        self.0.update(reward, max_next);
+        self.0.end_episode();
     }
 
     fn gamma(&self) -> f64 {
-        self.gamma
+        self.0.gamma
     }
 
     fn bootstraps_when_truncated(&self) -> bool {
@@ -75,11 +53,11 @@ impl Agent for QLearning {
     }
 
     fn epsilon(&self) -> f64 {
-        self.behaviour.epsilon()
+        self.0.epsilon()
     }
 
     fn q(&self) -> Option<&QTable> {
-        Some(&self.q)
+        Some(&self.0.q)
     }
 }
 
@@ -99,7 +77,7 @@ mod tests {
         assert_eq!(agent.begin(0), 1);
         // 1 + 0.5 (10 + 0.9 * 4 - 1) = 7.3; then greedy in state 1.
         assert_eq!(agent.step(10.0, 1), 0);
-        assert_eq!(agent.q.get(0, 1), 1.0 + 0.5 * (10.0 + 0.9 * 4.0 - 1.0));
+        assert_eq!(agent.0.q.get(0, 1), 1.0 + 0.5 * (10.0 + 0.9 * 4.0 - 1.0));
     }
 
     #[test]
@@ -115,10 +93,10 @@ mod tests {
         let mut agent = greedy_learner();
         agent.begin(0);
         agent.end(2.0, Last::Terminated);
-        assert_eq!(agent.q.get(0, 1), 1.0 + 0.5 * (2.0 - 1.0));
+        assert_eq!(agent.0.q.get(0, 1), 1.0 + 0.5 * (2.0 - 1.0));
         let mut agent = greedy_learner();
         agent.begin(0);
         agent.end(2.0, Last::Truncated(1));
-        assert_eq!(agent.q.get(0, 1), 1.0 + 0.5 * (2.0 + 0.9 * 4.0 - 1.0));
+        assert_eq!(agent.0.q.get(0, 1), 1.0 + 0.5 * (2.0 + 0.9 * 4.0 - 1.0));
     }
 }

@@ -4,76 +4,53 @@
 //!
 //! The book's order: A′ is chosen from S′ *before* the update, and is the action that is played.
 
-use super::{Agent, Behaviour, Last, QTable, Schedule, ScheduleState};
+use super::tabular::Tabular;
+use super::{Agent, Last, QTable, Schedule};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
-
-/// `R + γ Q(S′, A′) − Q(S, A)`; pass 0 as `q_next` where S′ is terminal.
-#[inline]
-pub fn sarsa_td_error(q: f64, reward: f64, gamma: f64, q_next: f64) -> f64 {
-    reward + gamma * q_next - q
-}
 
 /// Tabular SARSA, ε-greedy.
 ///
 /// Deviation 1: where an episode is truncated, the book has no rule; A′ is chosen from the last
 /// state as anywhere else, bootstrapped from, and not played.
 #[derive(Debug, Clone)]
-pub struct Sarsa {
-    q: QTable,
-    gamma: f64,
-    alpha: ScheduleState,
-    behaviour: Behaviour,
-    s: usize,
-    a: Action,
-}
+pub struct Sarsa(Tabular);
 
 impl Sarsa {
     /// A learner with the table `q`; exploration draws from `stream`.
     pub fn new(q: QTable, gamma: f64, alpha: Schedule, epsilon: Schedule, stream: Stream) -> Self {
-        let behaviour = Behaviour::new(epsilon, stream);
-        Self { q, gamma, alpha: ScheduleState::new(alpha), behaviour, s: 0, a: 0 }
-    }
-
-    #[inline]
-    fn update(&mut self, reward: f64, q_next: f64) {
-        let q = self.q.get_mut(self.s, self.a);
-        *q += self.alpha.value() * sarsa_td_error(*q, reward, self.gamma, q_next);
-        self.alpha.step();
+        Self(Tabular::new(q, gamma, alpha, epsilon, stream))
     }
 }
 
 impl Agent for Sarsa {
     #[inline]
     fn begin(&mut self, s: usize) -> Action {
-        self.s = s;
-        self.a = self.behaviour.choose(self.q.row(s));
-        self.a
+        let a = self.0.choose(s);
+        self.0.play(s, a)
     }
 
     #[inline]
     fn step(&mut self, reward: f64, next: usize) -> Action {
-        let a_next = self.behaviour.choose(self.q.row(next));
-        self.update(reward, self.q.get(next, a_next));
-        (self.s, self.a) = (next, a_next);
-        a_next
+        let a_next = self.0.choose(next);
+        self.0.update(reward, self.0.q.get(next, a_next));
+        self.0.play(next, a_next)
     }
 
     fn end(&mut self, reward: f64, last: Last) {
         let q_next = match last {
             Last::Terminated => 0.0,
             Last::Truncated(next) => {
-                let a_next = self.behaviour.choose(self.q.row(next));
-                self.q.get(next, a_next)
+                let a_next = self.0.choose(next);
+                self.0.q.get(next, a_next)
             }
         };
-        self.update(reward, q_next);
-        self.alpha.end_episode();
-        self.behaviour.end_episode();
+        self.0.update(reward, q_next);
+        self.0.end_episode();
     }
 
     fn gamma(&self) -> f64 {
-        self.gamma
+        self.0.gamma
     }
 
     fn bootstraps_when_truncated(&self) -> bool {
@@ -81,11 +58,11 @@ impl Agent for Sarsa {
     }
 
     fn epsilon(&self) -> f64 {
-        self.behaviour.epsilon()
+        self.0.epsilon()
     }
 
     fn q(&self) -> Option<&QTable> {
-        Some(&self.q)
+        Some(&self.0.q)
     }
 }
 
@@ -102,9 +79,9 @@ mod tests {
         // Back to state 1: A' = 0 by the old values (4 > 2), though Q(1, 0) then falls to
         // 4 + 0.5 (-20 + 0.9 * 4 - 4) = -6.2.
         assert_eq!(agent.step(-20.0, 1), 0);
-        assert_eq!(agent.q.get(1, 0), 4.0 + 0.5 * (-20.0 + 0.9 * 4.0 - 4.0));
+        assert_eq!(agent.0.q.get(1, 0), 4.0 + 0.5 * (-20.0 + 0.9 * 4.0 - 4.0));
         agent.end(1.0, Last::Terminated);
         let q = 4.0 + 0.5 * (-20.0 + 0.9 * 4.0 - 4.0);
-        assert_eq!(agent.q.get(1, 0), q + 0.5 * (1.0 - q));
+        assert_eq!(agent.0.q.get(1, 0), q + 0.5 * (1.0 - q));
     }
 }

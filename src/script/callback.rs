@@ -15,9 +15,6 @@ use super::state::{State, StepView};
 use crate::mdp::{Env, Schema};
 use crate::shaping::{CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn};
 
-/// A callback failed: the diagnostic, as an error type.
-pub type CallbackFault = Diagnostic;
-
 fn fault(diagnostic: Diagnostic) -> Fault {
     Fault(Box::new(diagnostic))
 }

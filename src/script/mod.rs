@@ -28,7 +28,7 @@ mod state;
 mod syntax;
 mod value;
 
-pub use callback::{CallbackFault, Callbacks};
+pub use callback::Callbacks;
 pub use diagnostic::{Diagnostic, Place, Severity};
 pub use host::{Host, load};
 pub use plan::{
