@@ -18,6 +18,7 @@ experiment(#{
     agent: q_learning(#{ alpha: 0.1, gamma: 0.99, epsilon: 0.1 }),
     discretiser: cells([2, 2], cell),
     potential: upright,
+    potential_on: "raw",
     reward: paid,
     episodes: 1,
     seeds: 1,
