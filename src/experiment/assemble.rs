@@ -12,14 +12,6 @@ use crate::shaping::{
     shaped_model,
 };
 
-/// A representative for each cell: what Φ of a cell is evaluated on.
-pub(super) enum Representative {
-    /// The states themselves.
-    States,
-    /// Bin centres.
-    Centres(Bins),
-}
-
 /// A state with every field in the middle of its range (0 where that is unbounded): the values of
 /// fields that are not binned.
 fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
@@ -31,7 +23,7 @@ fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
     fields
 }
 
-/// How a variant's potential is evaluated.
+/// How a variant's potential is evaluated: on the states themselves, on bin centres, or raw.
 pub(super) fn potential<E: Env + Clone + 'static>(
     host: &Host,
     variant: &Variant,
@@ -42,15 +34,8 @@ pub(super) fn potential<E: Env + Clone + 'static>(
     let schema = env.schema();
     let n_fields = schema.fields.len();
     let mut phi = host.callbacks().potential(callback, &schema);
-    let representative = match (&variant.discretiser, variant.potential_on) {
-        (DiscretiserSpec::StateIndex, _) => Representative::States,
-        (DiscretiserSpec::Bins(dims), PhiOn::Cell) => Representative::Centres(
-            Bins::new(dims).expect("the plan's bins were checked when it was resolved"),
-        ),
-        _ => return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi))),
-    };
-    let potential = match representative {
-        Representative::States => {
+    let potential = match (&variant.discretiser, variant.potential_on) {
+        (DiscretiserSpec::StateIndex, _) => {
             let states = env.clone();
             let mut at = move |index: usize| {
                 let mut fields = [0.0; MAX_FIELDS];
@@ -67,7 +52,8 @@ pub(super) fn potential<E: Env + Clone + 'static>(
             }
             CellPotential::partial(table, Box::new(at))
         }
-        Representative::Centres(bins) => {
+        (DiscretiserSpec::Bins(dims), PhiOn::Cell) => {
+            let bins = Bins::new(dims).expect("checked when the plan was resolved");
             let base = middle(&schema);
             CellPotential::new(
                 n_cells,
@@ -78,6 +64,7 @@ pub(super) fn potential<E: Env + Clone + 'static>(
                 }),
             )
         }
+        _ => return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi))),
     };
     Ok(AnyPotential::Cell(potential))
 }

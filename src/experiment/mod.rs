@@ -32,5 +32,5 @@ pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use record::{EpisodeRow, UnitRecord};
 pub use store::{Store, StoreError, StoredUnit, write_atomically, write_atomically_with};
-pub use train::{Interrupted, Limits, TrainError, World, train};
+pub use train::{Limits, TrainError, World, train};
 pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};

@@ -31,10 +31,6 @@ pub struct Limits {
     pub n_terms: usize,
 }
 
-/// The run was asked to stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Interrupted;
-
 /// Why training ended early.
 #[derive(Debug)]
 pub enum TrainError {
