@@ -38,6 +38,8 @@
 //! 4. A `success_rate` outside [0, 1]: Gymnasium samples from what are no probabilities.
 //! 5. A `reward_schedule` that is not three finite numbers: Gymnasium ignores a fourth.
 
+mod draw;
+
 use std::sync::Arc;
 
 use super::error::EnvError;

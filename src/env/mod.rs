@@ -7,8 +7,10 @@
 //! - [`Registered`]: what an environment provides beyond its dynamics; [`KwargSpec`], [`Kwargs`]:
 //!   its constructor's arguments; [`EnvError`]: what can be wrong with them
 //! - [`Session`]: an environment as `gymnasium.make` returns it, dynamic, with its time limit
+//! - [`scene`]: what an environment looks like
 //! - [`rollout`]: an episode as JSON lines; [`recording`]: replaying recorded trajectories
 
+mod actions;
 mod bounds;
 pub mod cart_pole;
 mod error;
@@ -19,8 +21,10 @@ pub mod recording;
 mod registered;
 pub mod registry;
 pub mod rollout;
+pub mod scene;
 mod session;
 
+pub use actions::PlayedAction;
 pub use error::EnvError;
 pub use kwargs::{KwargKind, KwargSpec, Kwargs};
 pub use registered::{Example, Observation, Registered};

@@ -34,6 +34,8 @@
 //! Deviations:
 //! 1. `goal_velocity` must be finite; Gymnasium takes a NaN, and then no episode terminates.
 
+mod draw;
+
 use serde_json::{Map, Value};
 
 use super::bounds;

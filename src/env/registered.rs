@@ -5,6 +5,7 @@ use serde_json::{Map, Value};
 
 use super::error::EnvError;
 use super::kwargs::{KwargSpec, Kwargs};
+use super::scene::Draw;
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Env, FiniteState};
 
@@ -41,7 +42,7 @@ pub struct Example {
 }
 
 /// An environment that can be made from an id and arguments.
-pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
+pub trait Registered: Env<Obs: Into<Observation>> + Draw + Clone + 'static {
     /// One line for `list`.
     const SUMMARY: &'static str;
 

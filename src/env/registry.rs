@@ -6,12 +6,14 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
+use super::actions::PlayedAction;
 use super::cart_pole::CartPole;
 use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
 use super::mountain_car::MountainCar;
 use super::registered::{Example, Observation, Registered};
+use super::scene::{Draw, Scene, TextPicture};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Env, FiniteMdp, Schema};
 
@@ -26,6 +28,8 @@ pub struct EnvSpec {
     pub reward_threshold: Option<f64>,
     /// One line for `list`.
     pub summary: &'static str,
+    /// Steps per second at which it is shown.
+    pub fps: u32,
     /// What a first script for it may say.
     pub example: Example,
     /// The reset options it knows.
@@ -93,6 +97,8 @@ pub(super) trait Dynamic {
     fn n_actions(&self) -> usize;
     fn schema(&self) -> Schema;
     fn finite(&self) -> Option<&Arc<FiniteMdp>>;
+    fn scene(&self, last: Option<&PlayedAction>) -> Scene;
+    fn text(&self) -> Option<TextPicture>;
 }
 
 /// What [`Dynamic::step`] returns.
@@ -137,6 +143,14 @@ impl<E: Registered> Dynamic for E {
     fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         Env::finite(self)
     }
+
+    fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        Draw::scene(self, last)
+    }
+
+    fn text(&self) -> Option<TextPicture> {
+        Draw::text(self)
+    }
 }
 
 /// Generates [`AnyEnv`] and the list of specs from entries of the form
@@ -180,6 +194,7 @@ macro_rules! environments {
                 id: $id,
                 max_steps: $steps,
                 reward_threshold: $threshold,
+                fps: <$type as Draw>::FPS,
                 summary: <$type as Registered>::SUMMARY,
                 example: <$type as Registered>::EXAMPLE,
                 reset_options: <$type as Registered>::RESET_OPTIONS,
@@ -213,6 +228,16 @@ impl AnyEnv {
     /// Its model, if it has a finite one.
     pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         self.dynamic().finite()
+    }
+
+    /// What its present state looks like; `last` is the action that led to it.
+    pub fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        self.dynamic().scene(last)
+    }
+
+    /// Its present state in characters, if it is a world for them.
+    pub fn text(&self) -> Option<TextPicture> {
+        self.dynamic().text()
     }
 }
 

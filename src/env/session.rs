@@ -13,9 +13,11 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::actions::PlayedAction;
 use super::error::EnvError;
 use super::registered::Observation;
 use super::registry::{AnyEnv, EnvSpec, find};
+use super::scene::{Scene, TextPicture};
 use crate::mdp::Schema;
 use crate::mdp::numpy::{NumpyRng, Seed};
 
@@ -82,6 +84,16 @@ impl Session {
     /// The time limit in force.
     pub fn max_episode_steps(&self) -> Option<u32> {
         self.limit
+    }
+
+    /// What the present state looks like; `last` is the action that led to it: none after a reset.
+    pub fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        self.env.scene(last)
+    }
+
+    /// The present state in characters, if it is a world for them.
+    pub fn text(&self) -> Option<TextPicture> {
+        self.env.text()
     }
 
     /// Sets an attribute, for example `CartPole`'s `kinematics_integrator`.

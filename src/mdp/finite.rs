@@ -268,6 +268,12 @@ impl FiniteEnv {
         FiniteState { index: self.state, outcome: FiniteState::START }
     }
 
+    /// The state it is in.
+    #[inline]
+    pub fn state(&self) -> u32 {
+        self.state
+    }
+
     /// Samples an outcome of `action` and moves there. Returns it with the new state.
     #[inline]
     pub fn step(&mut self, action: usize, rng: &mut NumpyRng) -> (FiniteState, &Outcome) {
