@@ -98,7 +98,7 @@ pub(super) trait Dynamic {
     fn schema(&self) -> Schema;
     fn finite(&self) -> Option<&Arc<FiniteMdp>>;
     fn scene(&self, last: Option<&PlayedAction>) -> Scene;
-    fn text(&self) -> Option<TextPicture>;
+    fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture>;
 }
 
 /// What [`Dynamic::step`] returns.
@@ -148,8 +148,8 @@ impl<E: Registered> Dynamic for E {
         Draw::scene(self, last)
     }
 
-    fn text(&self) -> Option<TextPicture> {
-        Draw::text(self)
+    fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        Draw::text(self, last)
     }
 }
 
@@ -236,8 +236,8 @@ impl AnyEnv {
     }
 
     /// Its present state in characters, if it is a world for them.
-    pub fn text(&self) -> Option<TextPicture> {
-        self.dynamic().text()
+    pub fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        self.dynamic().text(last)
     }
 }
 

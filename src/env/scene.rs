@@ -6,20 +6,21 @@
 //! Coordinates are the environment's own (metres, cells), y upwards.
 
 pub mod palette;
+pub mod pieces;
 mod text;
 
 pub use palette::Colour;
 pub use text::{Span, TextPicture};
 
-use super::actions::PlayedAction;
-use crate::mdp::Env;
+use super::actions::{ActionTable, PlayedAction};
+use crate::mdp::{Env, math};
 
 /// A point of the world: x to the right, y upwards.
 pub type Point = [f64; 2];
 
 /// An environment that can be seen.
 pub trait Draw: Env {
-    /// Steps per second at which it is shown: Gymnasium's `render_fps`.
+    /// Steps per second at which it is shown: Gymnasium's `render_fps`, if one can follow that.
     const FPS: u32;
 
     /// The present state. `last` is the action that led to it: none after a reset.
@@ -27,7 +28,7 @@ pub trait Draw: Env {
 
     /// The present state in characters, for worlds that are made of few things in rows and
     /// columns. For other worlds, a picture of characters is made from the scene.
-    fn text(&self) -> Option<TextPicture> {
+    fn text(&self, _last: Option<&PlayedAction>) -> Option<TextPicture> {
         None
     }
 }
@@ -80,10 +81,14 @@ pub enum Shape {
 /// glides from one place to the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sprite {
-    /// Who it is, the same in every scene.
+    /// What it is, the same in every scene.
     pub name: &'static str,
+    /// Which of several it is.
+    pub number: usize,
     /// Where it stands.
     pub at: Point,
+    /// Where it comes from if it was not there before; it just appears if there is no such place.
+    pub from: Option<Point>,
     /// Its shapes, relative to `at`, from the back to the front.
     pub shapes: Vec<Shape>,
 }
@@ -128,9 +133,9 @@ impl Scene {
         Self { stride: 1.1, ..scene }
     }
 
-    /// Adds a sprite.
+    /// Adds a sprite, the only one of its name.
     pub fn sprite(&mut self, name: &'static str, at: Point, shapes: Vec<Shape>) {
-        self.items.push(Item::Sprite(Sprite { name, at, shapes }));
+        self.items.push(Item::Sprite(Sprite { name, number: 0, at, from: None, shapes }));
     }
 
     /// Adds a shape.
@@ -143,10 +148,10 @@ impl Scene {
         self.items.extend(shapes.iter().map(|shape| Item::Shape(shape.moved(at))));
     }
 
-    /// The sprite of a name.
-    pub fn find(&self, name: &str) -> Option<&Sprite> {
+    /// A sprite, by its name and number.
+    pub fn find(&self, name: &str, number: usize) -> Option<&Sprite> {
         self.items.iter().find_map(|item| match item {
-            Item::Sprite(sprite) if sprite.name == name => Some(sprite),
+            Item::Sprite(sprite) if sprite.name == name && sprite.number == number => Some(sprite),
             _ => None,
         })
     }
@@ -166,10 +171,12 @@ impl Scene {
         let mut scene = self.clone();
         for item in &mut scene.items {
             let Item::Sprite(sprite) = item else { continue };
-            let Some(old) = before.find(sprite.name) else { continue };
-            if distance(old.at, sprite.at) <= self.stride {
-                sprite.at = mix(old.at, sprite.at, share);
-            }
+            let near = |old: &Point| distance(*old, sprite.at) <= self.stride;
+            let start = match before.find(sprite.name, sprite.number) {
+                Some(old) => Some(old.at).filter(near),
+                None => sprite.from,
+            };
+            sprite.at = start.map_or(sprite.at, |start| mix(start, sprite.at, share));
         }
         scene
     }
@@ -207,6 +214,29 @@ pub fn of_action<T: Copy>(last: Option<&PlayedAction>, table: &[T]) -> Option<T>
     }
 }
 
+/// The force of an action that is one real number, or stands for one of `table`; 0 if there is none.
+pub(super) fn force(last: Option<&PlayedAction>, table: &ActionTable) -> f64 {
+    match last {
+        Some(PlayedAction::Box(numbers)) => numbers.first().copied().unwrap_or(0.0),
+        Some(PlayedAction::Index(index)) => usize::try_from(*index)
+            .ok()
+            .filter(|&i| i < table.len())
+            .map_or(0.0, |i| table.scalar(i).into()),
+        None => 0.0,
+    }
+}
+
+/// `pieces + 1` points of a circle, from the angle `start` on, by `sweep` (degrees,
+/// counterclockwise, 0 points to the right).
+pub fn arc(centre: Point, radius: f64, start: f64, sweep: f64, pieces: u32) -> Vec<Point> {
+    let angle = |i: u32| radians(start + sweep * f64::from(i) / f64::from(pieces));
+    (0..=pieces).map(|i| placed([radius, 0.0], math::sin_cos(angle(i)), centre)).collect()
+}
+
+fn radians(degrees: f64) -> f64 {
+    degrees * (std::f64::consts::PI / 180.0)
+}
+
 fn distance(a: Point, b: Point) -> f64 {
     let (x, y) = (b[0] - a[0], b[1] - a[1]);
     (x * x + y * y).sqrt()
@@ -227,6 +257,15 @@ impl Shape {
     pub fn square(width: f64, fill: Colour) -> Self {
         let half = width / 2.0;
         Self::rect([-half, -half], [half, half], fill)
+    }
+
+    /// A filled rectangle of a width and height around the origin, with round corners.
+    pub fn card(width: f64, height: f64, radius: f64, fill: Colour) -> Self {
+        let (x, y) = (width / 2.0 - radius, height / 2.0 - radius);
+        let corners = [[x, y], [-x, y], [-x, -y], [x, -y]];
+        let points: Vec<Point> =
+            (0..4).flat_map(|i| arc(corners[i], radius, 90.0 * i as f64, 90.0, 6)).collect();
+        Self::polygon(points, fill)
     }
 
     /// A line.
@@ -257,6 +296,30 @@ impl Shape {
         vec![
             Self::line([from, neck], width, colour),
             Self::polygon([to, side(1.0), side(-1.0)], colour),
+        ]
+    }
+
+    /// An arrow along a circle around `centre`, from the angle `start` on, by `sweep` (degrees,
+    /// counterclockwise, 0 points to the right); nothing if the sweep is 0.
+    pub fn turn(
+        centre: Point,
+        radius: f64,
+        [start, sweep]: [f64; 2],
+        width: f64,
+        colour: Colour,
+    ) -> Vec<Self> {
+        if sweep == 0.0 {
+            return Vec::new();
+        }
+        let points = arc(centre, radius, start, sweep, 24);
+        let end = points[points.len() - 1];
+        let (sin, cos) = math::sin_cos(radians(start + sweep));
+        let head = 2.4 * width * sweep.signum();
+        let ahead = [end[0] - sin * head, end[1] + cos * head];
+        let side = |sign: f64| [end[0] + sign * cos * head * 0.8, end[1] + sign * sin * head * 0.8];
+        vec![
+            Self::line(points, width, colour),
+            Self::polygon([ahead, side(1.0), side(-1.0)], colour),
         ]
     }
 

@@ -92,8 +92,8 @@ impl Session {
     }
 
     /// The present state in characters, if it is a world for them.
-    pub fn text(&self) -> Option<TextPicture> {
-        self.env.text()
+    pub fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        self.env.text(last)
     }
 
     /// Sets an attribute, for example `CartPole`'s `kinematics_integrator`.

@@ -45,8 +45,10 @@ pub fn lines(
     let (columns, rows) = (columns.max(1), rows.max(1));
     let fitting = scene.size[0] / scene.size[1] * f64::from(2 * rows);
     let columns = columns.min(fitting.floor().max(1.0) as u32);
-    let cells =
-        |[width, high]: [u32; 2]| (columns * width, height(scene, columns * width).div_ceil(high));
+    // What is less than a row at the bottom is cut off.
+    let cells = |[width, high]: [u32; 2]| {
+        (columns * width, (height(scene, columns * width) / high).clamp(1, rows))
+    };
     if palette == Palette::Plain {
         let (width, rows) = cells(DOTS);
         let mut image = Image::new(width, rows * DOTS[1], PAPER);

@@ -24,7 +24,8 @@ pub const MAX_WIDTH: u32 = 2000;
 pub struct Recorder {
     animation: Animation,
     title: String,
-    width: u32,
+    /// None before the first picture, if nobody has said.
+    width: Option<u32>,
     /// Seconds per step.
     step: f64,
     before: Option<Scene>,
@@ -33,13 +34,13 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recorder of pictures `width` pixels wide ([`MIN_WIDTH`] to [`MAX_WIDTH`]) at `fps` steps
-    /// per second. The title stands in every caption.
-    pub fn new(title: &str, width: u32, fps: f64) -> Self {
+    /// A recorder of pictures `width` pixels wide ([`MIN_WIDTH`] to [`MAX_WIDTH`]; by default what
+    /// fits on a slide) at `fps` steps per second. The title stands in the captions.
+    pub fn new(title: &str, width: Option<u32>, fps: f64) -> Self {
         Self {
             animation: Animation::new(),
             title: title.into(),
-            width: width.clamp(MIN_WIDTH, MAX_WIDTH),
+            width: width.map(|width| width.clamp(MIN_WIDTH, MAX_WIDTH)),
             step: 1.0 / fps,
             before: None,
             steps: 0,
@@ -50,7 +51,7 @@ impl Recorder {
     /// An episode starts.
     pub fn reset(&mut self, scene: Scene) {
         (self.steps, self.total) = (0, 0.0);
-        let image = self.image(&scene, &self.title, "");
+        let image = self.image(&scene, ["", ""]);
         self.animation.frame(image, self.step.max(FIRST));
         self.before = Some(scene);
     }
@@ -59,10 +60,9 @@ impl Recorder {
     pub fn step(&mut self, scene: Scene, action: &str, reward: f64, ending: Option<Ending>) {
         self.steps += 1;
         self.total += reward;
-        let left = format!("{}  {action}", self.title);
         let mut right = format!("step {}  return {}", self.steps, number(self.total));
         if let Some(ending) = ending {
-            right = format!("{} after {right}", ending.as_str());
+            right = format!("{}  {right}", ending.as_str());
         }
         let mut rest = self.step;
         if let Some(before) = self.before.take().filter(|before| scene.moves(before)) {
@@ -71,12 +71,12 @@ impl Recorder {
                 let share = f64::from(i) / images;
                 // Slow at both ends.
                 let share = share * share * (3.0 - 2.0 * share);
-                let image = self.image(&scene.between(&before, share), &left, &right);
+                let image = self.image(&scene.between(&before, share), [action, &right]);
                 self.animation.frame(image, GLIDE_FRAME);
                 rest -= GLIDE_FRAME;
             }
         }
-        let image = self.image(&scene, &left, &right);
+        let image = self.image(&scene, [action, &right]);
         self.animation.frame(image, rest);
         if ending.is_some() {
             self.animation.hold(LAST);
@@ -95,24 +95,34 @@ impl Recorder {
         self.animation.finish()
     }
 
-    fn image(&self, scene: &Scene, left: &str, right: &str) -> Image {
-        let face = Face::fitting(if self.width >= 560 { 20.0 } else { 16.0 });
+    fn image(&mut self, scene: &Scene, [action, right]: [&str; 2]) -> Image {
+        let width = *self.width.get_or_insert_with(|| slide_width(scene));
+        let face = Face::fitting(if width >= 560 { 20.0 } else { 16.0 });
         let strip = face.height() + 8;
         // Even, for those who turn the file into a video.
-        let high = (height(scene, self.width) + strip as u32 + 1) & !1;
-        let mut image = Image::new(self.width, high, WHITE);
+        let high = (height(scene, width) + strip as u32 + 1) & !1;
+        let mut image = Image::new(width, high, WHITE);
         let top = high as i32 - strip;
         image.paint(scene);
         image.bar(top, MIST.mixed(WHITE, 0.4));
-        let margin = 8;
-        let end = self.width as i32 - margin - face.width(right);
+        let (margin, gap) = (8, face.width("  "));
+        let end = width as i32 - margin - face.width(right);
         image.text(end, top + 4, face, INK, right);
-        // The left half gives way where both do not fit.
-        let room = (end - margin - face.width("  ")) / face.width("n");
-        let fitting: String = left.chars().take(room.max(0) as usize).collect();
-        image.text(margin, top + 4, face, INK, &fitting);
+        // What happens matters more than where.
+        let room = end - margin - gap;
+        let full = format!("{}  {action}", self.title);
+        let text = [full.trim_end(), action].into_iter().find(|text| face.width(text) <= room);
+        image.text(margin, top + 4, face, INK, text.unwrap_or_default());
         image
     }
+}
+
+/// The width of pictures of `scene` that fit on a slide, in pixels.
+fn slide_width(scene: &Scene) -> u32 {
+    const FIT: [f64; 2] = [600.0, 440.0];
+    let wide = FIT[1] * scene.size[0] / scene.size[1];
+    // Even, as the height.
+    ((wide.min(FIT[0]).round() as u32) & !1).clamp(MIN_WIDTH, MAX_WIDTH)
 }
 
 /// A return: without decimals if it has none, else with two.

@@ -3,9 +3,9 @@
 use super::FrozenLake;
 use crate::env::actions::PlayedAction;
 use crate::env::scene::palette::{
-    BLUE, Colour, GREEN, ICE, INK, ORANGE, PAPER, SLATE, WATER, WHITE, YELLOW,
+    BLUE, Colour, GREEN, ICE, INK, ORANGE, PAPER, SLATE, WATER, WHITE,
 };
-use crate::env::scene::{Draw, Point, Scene, Shape, Span, TextPicture, cell, of_action};
+use crate::env::scene::{Draw, Point, Scene, Shape, Span, TextPicture, cell, of_action, pieces};
 
 /// The directions of the actions.
 const WAYS: [Point; 4] = [[-1.0, 0.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
@@ -20,17 +20,13 @@ impl Draw for FrozenLake {
             scene.add_at(cell(s / map.cols, s % map.cols), &tile_shapes(tile));
         }
         let at = self.env.state() as usize;
-        let mut elf =
-            vec![Shape::disc([0.0, 0.0], 0.25, INK), Shape::disc([0.0, 0.0], 0.2, ORANGE)];
-        // Where it meant to go: the ice may have had it otherwise.
-        if let Some(way) = of_action(last, &WAYS) {
-            elf.push(Shape::chevron(way, 0.1, 0.06, WHITE));
-        }
+        // The chevron says where it meant to go: the ice may have had it otherwise.
+        let elf = pieces::walker(ORANGE, of_action(last, &WAYS));
         scene.sprite("elf", cell(at / map.cols, at % map.cols), elf);
         scene
     }
 
-    fn text(&self) -> Option<TextPicture> {
+    fn text(&self, _last: Option<&PlayedAction>) -> Option<TextPicture> {
         let map = &*self.map;
         let at = self.env.state() as usize;
         let row = |row: usize| (0..map.cols).map(move |col| row * map.cols + col);
@@ -49,15 +45,8 @@ fn tile_shapes(tile: u8) -> Vec<Shape> {
             Shape::disc([0.0, 0.0], 0.34, WATER),
             Shape::disc([0.03, -0.04], 0.26, WATER.mixed(INK, 0.5)),
         ],
-        b'G' => vec![
-            plain(ICE),
-            Shape::disc([0.0, -0.26], 0.22, GREEN),
-            Shape::line([[-0.06, -0.26], [-0.06, 0.32]], 0.05, INK),
-            Shape::polygon([[-0.06, 0.34], [0.3, 0.2], [-0.06, 0.06]], YELLOW),
-        ],
-        b'S' => {
-            vec![plain(ICE), Shape::square(0.78, BLUE.mixed(ICE, 0.45)), Shape::square(0.7, ICE)]
-        }
+        b'G' => [vec![plain(ICE)], pieces::goal()].concat(),
+        b'S' => pieces::start(BLUE.mixed(ICE, 0.45), ICE),
         _ => vec![
             plain(ICE),
             Shape::line([[-0.3, 0.12], [-0.12, 0.3]], 0.03, WHITE),

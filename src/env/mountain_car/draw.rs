@@ -18,12 +18,13 @@ impl Draw for MountainCar {
             Some(PlayedAction::Index(action)) => *action as f64 - 1.0,
             _ => 0.0,
         };
-        valley(self.position, push)
+        valley(self.position, GOAL_POSITION, push)
     }
 }
 
-/// The scene of a car at `position` whose engine pushes with `push` (-1 to 1).
-pub(in crate::env) fn valley(position: f64, push: f64) -> Scene {
+/// The scene of a car at `position` whose engine pushes with `push` (-1 to 1), with the flag at
+/// `goal`.
+pub(in crate::env) fn valley(position: f64, goal: f64, push: f64) -> Scene {
     let mut scene = Scene::new(LOW, HIGH, PAPER.mixed(ICE, 0.5));
     let ridge: Vec<Point> = (0..=96)
         .map(|i| LOW[0] + (HIGH[0] - LOW[0]) * f64::from(i) / 96.0)
@@ -33,11 +34,10 @@ pub(in crate::env) fn valley(position: f64, push: f64) -> Scene {
     hill.extend([[HIGH[0], LOW[1]], LOW]);
     scene.add(Shape::polygon(hill, EARTH));
     scene.add(Shape::line(ridge, 0.022, GREEN));
-    let (foot, top) = (height(GOAL_POSITION), height(GOAL_POSITION) + 0.19);
-    let flag =
-        [[GOAL_POSITION, top], [GOAL_POSITION + 0.1, top - 0.04], [GOAL_POSITION, top - 0.08]];
+    let (foot, top) = (height(goal), height(goal) + 0.19);
+    let flag = [[goal, top], [goal + 0.1, top - 0.04], [goal, top - 0.08]];
     scene.add(Shape::polygon(flag, YELLOW));
-    scene.add(Shape::line([[GOAL_POSITION, foot], [GOAL_POSITION, top]], 0.011, INK));
+    scene.add(Shape::line([[goal, foot], [goal, top]], 0.011, INK));
     // The slope of the ground is 1.35 cos(3x): the car stands along it.
     let slope = 1.35 * math::cos(3.0 * position);
     let length = (1.0 + slope * slope).sqrt();
