@@ -11,7 +11,7 @@ use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
 use super::mountain_car::MountainCar;
-use super::registered::{Example, Observation, Registered};
+use super::registered::{Example, Observation, Registered, Seen};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Env, FiniteMdp, Schema};
 
@@ -87,7 +87,7 @@ pub(super) trait Dynamic {
         &mut self,
         options: &Map<String, Value>,
         rng: &mut NumpyRng,
-    ) -> Result<Observation, EnvError>;
+    ) -> Result<(Observation, Seen), EnvError>;
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
     fn n_actions(&self) -> usize;
@@ -98,6 +98,7 @@ pub(super) trait Dynamic {
 /// What [`Dynamic::step`] returns.
 pub(super) struct DynamicStep {
     pub(super) obs: Observation,
+    pub(super) seen: Seen,
     pub(super) reward: f64,
     pub(super) terminated: bool,
     /// The probability of the outcome, on finite environments.
@@ -109,8 +110,9 @@ impl<E: Registered> Dynamic for E {
         &mut self,
         options: &Map<String, Value>,
         rng: &mut NumpyRng,
-    ) -> Result<Observation, EnvError> {
-        Ok(self.reset_with(options, rng)?.into())
+    ) -> Result<(Observation, Seen), EnvError> {
+        let obs = self.reset_with(options, rng)?;
+        Ok((obs.into(), Seen::of(self, &obs)))
     }
 
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
@@ -119,7 +121,8 @@ impl<E: Registered> Dynamic for E {
             .zip(self.outcome_index(&step.obs))
             .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
         let (reward, terminated) = (step.reward, step.terminated);
-        DynamicStep { obs: step.obs.into(), reward, terminated, probability }
+        let seen = Seen::of(self, &step.obs);
+        DynamicStep { obs: step.obs.into(), seen, reward, terminated, probability }
     }
 
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {

@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::error::EnvError;
-use super::registered::Observation;
+use super::registered::{Observation, Seen};
 use super::registry::{AnyEnv, EnvSpec, find};
 use crate::mdp::Schema;
 use crate::mdp::numpy::{NumpyRng, Seed};
@@ -46,6 +46,7 @@ pub struct Session {
     limit: Option<u32>,
     /// Steps since the last reset; `None` before the first one.
     elapsed: Option<u32>,
+    seen: Seen,
 }
 
 impl Session {
@@ -57,7 +58,15 @@ impl Session {
         let spec = find(id)?;
         let env = spec.make(kwargs)?;
         let schema = env.schema();
-        Ok(Self { spec, env, schema, rng: None, limit: spec.max_steps, elapsed: None })
+        Ok(Self {
+            spec,
+            env,
+            schema,
+            rng: None,
+            limit: spec.max_steps,
+            elapsed: None,
+            seen: Seen::default(),
+        })
     }
 
     /// Replaces the time limit: -1 means none.
@@ -82,6 +91,22 @@ impl Session {
     /// The time limit in force.
     pub fn max_episode_steps(&self) -> Option<u32> {
         self.limit
+    }
+
+    /// Number of states of the environment's model, if it has one.
+    pub fn n_states(&self) -> Option<usize> {
+        self.env.finite().map(|mdp| mdp.n_states())
+    }
+
+    /// The index of the present state in the environment's model, if it has one; `None` before the
+    /// first reset.
+    pub fn state_index(&self) -> Option<usize> {
+        self.seen.index
+    }
+
+    /// The numbers of the present state that [`Self::schema`] names; zeros before the first reset.
+    pub fn fields(&self) -> &[f64] {
+        &self.seen.fields[..self.schema.fields.len()]
     }
 
     /// Sets an attribute, for example `CartPole`'s `kinematics_integrator`.
@@ -122,7 +147,8 @@ impl Session {
             (None, Some(rng)) => rng.clone(),
             (None, None) => return Err(EnvError::about("seed", "the first reset needs a seed")),
         };
-        let obs = self.env.dynamic_mut().reset(options, &mut rng)?;
+        let (obs, seen) = self.env.dynamic_mut().reset(options, &mut rng)?;
+        self.seen = seen;
         self.rng = Some(rng);
         self.elapsed = Some(0);
         Ok(obs)
@@ -152,6 +178,7 @@ impl Session {
         };
         let step = self.env.dynamic_mut().step(index, rng);
         *elapsed = elapsed.saturating_add(1);
+        self.seen = step.seen;
         Ok(SessionStep {
             obs: step.obs,
             reward: step.reward,
