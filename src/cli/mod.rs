@@ -14,6 +14,7 @@ mod output;
 mod parity;
 mod play;
 mod rollout;
+mod show;
 
 use std::process::ExitCode;
 
@@ -40,6 +41,8 @@ enum Command {
     List(list::Args),
     /// Play actions in an environment and print what happens
     Rollout(rollout::Args),
+    /// Show a results folder: its table, and pictures of what was learned
+    Show(show::Args),
     /// Play what a unit of a results folder has learned
     Play(play::Args),
     /// Replay recorded Gymnasium trajectories and compare
@@ -144,6 +147,7 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
         Command::Check(args) => check::run(&args),
         Command::List(args) => list::run(&args),
         Command::Rollout(args) => rollout::run(&args),
+        Command::Show(args) => show::run(&args),
         Command::Play(args) => play::run(&args),
         Command::Parity(args) => parity::run(&args),
         Command::Golden(args) => golden::run(&args),
