@@ -7,10 +7,10 @@
 
 use super::landscape::Locate;
 use crate::env::rollout::{Event, Length, RolloutError, drive};
-use crate::env::{EnvError, Session};
+use crate::env::{EnvError, PlayedAction, Session};
 use crate::learn::{QTable, argmax_tol};
+use crate::mdp::Ending;
 use crate::mdp::numpy::Seed;
-use crate::mdp::{Action, Ending};
 use crate::script::{Host, Variant};
 
 /// A greedy policy over a table.
@@ -34,9 +34,9 @@ impl Policy {
     ///
     /// # Errors
     /// If a scripted discretiser fails.
-    pub fn action(&mut self, session: &Session) -> Result<Action, RolloutError> {
+    pub fn action(&mut self, session: &Session) -> Result<PlayedAction, RolloutError> {
         match self.locate.present(session) {
-            Ok(cell) => Ok(argmax_tol(self.q.row(cell))),
+            Ok(cell) => Ok(session.action(argmax_tol(self.q.row(cell)))),
             Err(fault) => Err(RolloutError::Policy(fault.0)),
         }
     }
@@ -75,7 +75,7 @@ pub fn play(
     mut each: impl FnMut(&Session, Event<'_>) -> Result<(), RolloutError>,
 ) -> Result<Vec<PlayedEpisode>, RolloutError> {
     let mut episodes: Vec<PlayedEpisode> = Vec::new();
-    let policy = |session: &Session, _: &_| policy.action(session).map(|action| action as i64);
+    let policy = |session: &Session, _: &_| policy.action(session);
     drive(session, seed, length, policy, |session, event| {
         match event {
             Event::Reset { .. } => {

@@ -87,7 +87,7 @@ pub struct Picture {
     /// What is there, `[y.n][x.n]`, in ascending order of both fields.
     pub places: Vec<Place>,
     /// What the actions are called.
-    pub actions: &'static [&'static str],
+    pub actions: Vec<String>,
     /// The map, for grid worlds.
     pub tiles: Option<Tiles>,
 }
@@ -150,6 +150,11 @@ pub fn pictures(
             if quantity == Quantity::Potential && variant.potential.is_none() {
                 continue;
             }
+            // A map of values has the arrows in it.
+            if quantity == Quantity::Policy && frame.is_map && quantities.contains(&Quantity::Value)
+            {
+                continue;
+            }
             let of = |place: &Option<(usize, Option<f64>)>| match *place {
                 None => Place::Nothing,
                 Some((cell, phi)) => {
@@ -171,7 +176,7 @@ pub fn pictures(
                 x: frame.x.clone(),
                 y: frame.y.clone(),
                 places: cells.iter().map(of).collect(),
-                actions: landscape.schema.actions,
+                actions: landscape.schema.actions.clone(),
                 tiles: grid.map(|grid| tiles(grid, &cells, tables, quantity)),
             });
         }
