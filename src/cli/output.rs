@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use super::Failure;
+use crate::report::heat_map::Ink;
 use crate::script::Diagnostic;
 
 /// Writes to stdout.
@@ -10,6 +11,15 @@ pub(super) fn out(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
     stdout.write_all(text.as_bytes())?;
     stdout.flush()
+}
+
+/// What stdout can show: colours if it is a terminal that has them and `NO_COLOR` is not set.
+pub(super) fn ink() -> Ink {
+    if anstream::AutoStream::choice(&io::stdout()) == anstream::ColorChoice::Never {
+        return Ink::Plain;
+    }
+    let depth = std::env::var("COLORTERM").unwrap_or_default();
+    if matches!(depth.as_str(), "truecolor" | "24bit") { Ink::True } else { Ink::Indexed }
 }
 
 /// Writes a line for humans to stderr. If even that is impossible there is nobody to tell.

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::actions::{ActionTable, PlayedAction};
 use super::error::EnvError;
-use super::registered::{Observation, Registered};
+use super::registered::{Observation, Registered, Seen};
 use super::registry::AnyEnv;
 use super::scene::{Draw, Scene, TextPicture};
 use crate::mdp::numpy::NumpyRng;
@@ -15,7 +15,7 @@ use crate::mdp::{ActionSpace, Env, FiniteMdp, Schema, Step};
 
 /// An environment, seen through a vtable: for sessions, which are dynamic in every step.
 pub(super) trait Dynamic {
-    fn reset(&mut self, rng: &mut NumpyRng) -> Observation;
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen);
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
     fn step_box(&mut self, action: &[f32], rng: &mut NumpyRng) -> DynamicStep;
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
@@ -33,6 +33,7 @@ pub(super) trait Dynamic {
 /// What [`Dynamic::step`] returns.
 pub(super) struct DynamicStep {
     pub(super) obs: Observation,
+    pub(super) seen: Seen,
     pub(super) reward: f64,
     pub(super) terminated: bool,
     /// The probability of the outcome, on finite environments.
@@ -45,13 +46,15 @@ impl DynamicStep {
             .zip(env.outcome_index(&step.obs))
             .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
         let (reward, terminated) = (step.reward, step.terminated);
-        Self { obs: step.obs.into(), reward, terminated, probability }
+        let seen = Seen::of(env, &step.obs);
+        Self { obs: step.obs.into(), seen, reward, terminated, probability }
     }
 }
 
 impl<E: Registered> Dynamic for E {
-    fn reset(&mut self, rng: &mut NumpyRng) -> Observation {
-        Env::reset(self, rng).into()
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen) {
+        let obs = Env::reset(self, rng);
+        (obs.into(), Seen::of(self, &obs))
     }
 
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {

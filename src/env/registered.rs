@@ -7,7 +7,7 @@ use super::actions::ActionTable;
 use super::error::EnvError;
 use super::kwargs::{KwargSpec, Kwargs};
 use super::scene::Draw;
-use crate::mdp::{Env, FiniteState};
+use crate::mdp::{Env, FiniteState, MAX_FIELDS};
 
 /// An observation whose type is known at run time only. Serialises as Gymnasium's would: a bare
 /// integer, or a list of float32 in the shortest decimal that reads back as the same float32.
@@ -29,6 +29,24 @@ impl<const N: usize> From<[f32; N]> for Observation {
 impl From<FiniteState> for Observation {
     fn from(obs: FiniteState) -> Self {
         Self::Index(obs.index.into())
+    }
+}
+
+/// A state as scripts and discretisers see it, whatever the type of its observation.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Seen {
+    /// Its index in the model, on finite environments.
+    pub(super) index: Option<usize>,
+    /// The numbers that the schema names, and zeros.
+    pub(super) fields: [f64; MAX_FIELDS],
+}
+
+impl Seen {
+    /// What `env` says of `obs`.
+    pub(super) fn of<E: Env>(env: &E, obs: &E::Obs) -> Self {
+        let mut fields = [0.0; MAX_FIELDS];
+        env.fields(obs, &mut fields);
+        Self { index: env.state_index(obs), fields }
     }
 }
 

@@ -16,7 +16,7 @@ use serde_json::{Map, Value};
 use super::actions::{ActionTable, PlayedAction, checked_box};
 use super::config::EnvConfig;
 use super::error::EnvError;
-use super::registered::Observation;
+use super::registered::{Observation, Seen};
 use super::registry::{AnyEnv, EnvSpec, find};
 use super::scene::{Scene, TextPicture};
 use crate::mdp::numpy::{NumpyRng, Seed};
@@ -51,6 +51,7 @@ pub struct Session {
     reset_options: Map<String, Value>,
     /// Steps since the last reset; `None` before the first one.
     elapsed: Option<u32>,
+    seen: Seen,
 }
 
 impl Session {
@@ -70,7 +71,8 @@ impl Session {
         let env = spec.build(config)?;
         let schema = env.schema();
         let (limit, reset_options) = (spec.max_steps, config.reset_options.clone());
-        Ok(Self { spec, env, schema, rng: None, limit, reset_options, elapsed: None })
+        let seen = Seen::default();
+        Ok(Self { spec, env, schema, rng: None, limit, reset_options, elapsed: None, seen })
     }
 
     /// Replaces the time limit: -1 means none.
@@ -90,6 +92,22 @@ impl Session {
     /// How scripts name its states, and what its actions are called.
     pub fn schema(&self) -> &Schema {
         &self.schema
+    }
+
+    /// Number of states of the environment's model, if it has one.
+    pub fn n_states(&self) -> Option<usize> {
+        self.env.finite().map(|mdp| mdp.n_states())
+    }
+
+    /// The index of the present state in the environment's model, if it has one; `None` before the
+    /// first reset.
+    pub fn state_index(&self) -> Option<usize> {
+        self.seen.index
+    }
+
+    /// The numbers of the present state that [`Self::schema`] names; zeros before the first reset.
+    pub fn fields(&self) -> &[f64] {
+        &self.seen.fields[..self.schema.fields.len()]
     }
 
     /// What actions it takes.
@@ -160,7 +178,8 @@ impl Session {
             (None, None) => return Err(EnvError::about("seed", "the first reset needs a seed")),
         };
         self.spec.set_reset_options(&mut self.env, options)?;
-        let obs = self.env.dynamic_mut().reset(&mut rng);
+        let (obs, seen) = self.env.dynamic_mut().reset(&mut rng);
+        self.seen = seen;
         self.rng = Some(rng);
         self.elapsed = Some(0);
         Ok(obs)
@@ -192,6 +211,7 @@ impl Session {
             }
         };
         *elapsed = elapsed.saturating_add(1);
+        self.seen = step.seen;
         Ok(SessionStep {
             obs: step.obs,
             reward: step.reward,

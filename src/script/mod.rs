@@ -29,6 +29,7 @@ mod syntax;
 mod value;
 
 pub use callback::Callbacks;
+pub(crate) use diagnostic::suggest;
 pub use diagnostic::{Diagnostic, Place, Severity};
 pub use host::{Host, load};
 pub use plan::{

@@ -15,6 +15,7 @@ mod discretiser;
 mod potential;
 mod reward;
 
+pub use crate::mdp::MAX_FIELDS;
 pub use bins::{Bins, BinsError, Dim, MAX_CELLS};
 pub use discretiser::{CellFn, Discretiser, ScriptedCells, StateIndex};
 pub use potential::{
@@ -24,9 +25,6 @@ pub use potential::{
 pub use reward::{
     AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,
 };
-
-/// The largest number of fields a state may have: lets the step use a buffer on the stack.
-pub const MAX_FIELDS: usize = 16;
 
 /// A callback failed while training. Carries the script's own error, so that the floors above can
 /// show its place.
