@@ -9,6 +9,10 @@ use super::font;
 use crate::env::scene::palette::{INK, MIST, PAPER};
 use crate::env::scene::{Colour, Point, Scene, Shape};
 
+/// The width of an edge that is drawn alone, in pixels: more than half a pixel is in ink even if
+/// it lies between two of them.
+const EDGE: f32 = 1.1;
+
 /// A rectangle of opaque pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
@@ -88,7 +92,7 @@ impl Image {
                 let Some(path) = view.path(points, true) else { return };
                 self.fill(&path, surface(*fill));
                 if outlined {
-                    self.stroke(&path, 1.0, INK);
+                    self.stroke(&path, EDGE, INK);
                 }
             }
             Shape::Line { points, width, colour } => {
@@ -98,7 +102,7 @@ impl Image {
                     return;
                 };
                 let (width, colour) = if outlined {
-                    (1.0, INK)
+                    (EDGE, INK)
                 } else {
                     // A line stays visible, however small the picture.
                     (view.length(*width).max(0.7), *colour)
@@ -114,7 +118,7 @@ impl Image {
                 };
                 self.fill(&path, surface(*fill));
                 if outlined {
-                    self.stroke(&path, 1.0, INK);
+                    self.stroke(&path, EDGE, INK);
                 }
             }
             Shape::Text { centre, height, colour, text } => {

@@ -3,6 +3,7 @@
 use super::font::Face;
 use super::gif::Animation;
 use super::raster::{Image, height};
+use crate::env::PlayedAction;
 use crate::env::scene::Scene;
 use crate::env::scene::palette::{INK, MIST, WHITE};
 use crate::mdp::Ending;
@@ -123,6 +124,19 @@ fn slide_width(scene: &Scene) -> u32 {
     let wide = FIT[1] * scene.size[0] / scene.size[1];
     // Even, as the height.
     ((wide.min(FIT[0]).round() as u32) & !1).clamp(MIN_WIDTH, MAX_WIDTH)
+}
+
+/// An action in a word or two: its name, or its numbers.
+pub fn describe(action: &PlayedAction, names: &[String]) -> String {
+    match action {
+        PlayedAction::Index(index) => {
+            let name = usize::try_from(*index).ok().and_then(|i| names.get(i));
+            name.map_or_else(|| index.to_string(), String::clone)
+        }
+        PlayedAction::Box(numbers) => {
+            numbers.iter().map(|&x| format!("{x:.2}")).collect::<Vec<_>>().join(" ")
+        }
+    }
 }
 
 /// A return: without decimals if it has none, else with two.
