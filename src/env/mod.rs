@@ -2,15 +2,17 @@
 //!
 //! - [`registry`]: [`specs`], [`find`], [`make`]: from an id and arguments to an [`AnyEnv`], and by
 //!   an [`EnvVisitor`] to static dispatch
-//! - [`cart_pole`], [`mountain_car`], [`frozen_lake`]: the dynamics, documented under Gymnasium's
-//!   headings
+//! - [`cart_pole`], [`mountain_car`], [`frozen_lake`], [`cliff_walking`], [`taxi`], [`blackjack`]:
+//!   the dynamics, documented under Gymnasium's headings
 //! - [`Registered`]: what an environment provides beyond its dynamics; [`KwargSpec`], [`Kwargs`]:
 //!   its constructor's arguments; [`EnvError`]: what can be wrong with them
 //! - [`Session`]: an environment as `gymnasium.make` returns it, dynamic, with its time limit
 //! - [`rollout`]: an episode as JSON lines; [`recording`]: replaying recorded trajectories
 
+pub mod blackjack;
 mod bounds;
 pub mod cart_pole;
+pub mod cliff_walking;
 mod error;
 pub mod frozen_lake;
 mod kwargs;
@@ -20,9 +22,10 @@ mod registered;
 pub mod registry;
 pub mod rollout;
 mod session;
+pub mod taxi;
 
 pub use error::EnvError;
 pub use kwargs::{KwargKind, KwargSpec, Kwargs};
-pub use registered::{Example, Observation, Registered};
-pub use registry::{AnyEnv, EnvSpec, EnvVisitor, find, make, specs};
+pub use registered::{ActionMask, Example, Observation, Registered};
+pub use registry::{AnyEnv, EnvSpec, EnvVisitor, find, find_with_note, make, specs};
 pub use session::{Session, SessionStep, time_limit};

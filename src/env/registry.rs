@@ -6,12 +6,15 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
+use super::blackjack::Blackjack;
 use super::cart_pole::CartPole;
+use super::cliff_walking::CliffWalking;
 use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
 use super::mountain_car::MountainCar;
-use super::registered::{Example, Observation, Registered};
+use super::registered::{ActionMask, Example, Observation, Registered};
+use super::taxi::Taxi;
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Env, FiniteMdp, Schema};
 
@@ -87,12 +90,13 @@ pub(super) trait Dynamic {
         &mut self,
         options: &Map<String, Value>,
         rng: &mut NumpyRng,
-    ) -> Result<Observation, EnvError>;
+    ) -> Result<(Observation, Option<ActionMask>), EnvError>;
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
     fn n_actions(&self) -> usize;
     fn schema(&self) -> Schema;
     fn finite(&self) -> Option<&Arc<FiniteMdp>>;
+    fn n_states(&self) -> Option<usize>;
 }
 
 /// What [`Dynamic::step`] returns.
@@ -102,6 +106,8 @@ pub(super) struct DynamicStep {
     pub(super) terminated: bool,
     /// The probability of the outcome, on finite environments.
     pub(super) probability: Option<f64>,
+    /// Which actions can do anything next, where Gymnasium says so.
+    pub(super) mask: Option<ActionMask>,
 }
 
 impl<E: Registered> Dynamic for E {
@@ -109,17 +115,18 @@ impl<E: Registered> Dynamic for E {
         &mut self,
         options: &Map<String, Value>,
         rng: &mut NumpyRng,
-    ) -> Result<Observation, EnvError> {
-        Ok(self.reset_with(options, rng)?.into())
+    ) -> Result<(Observation, Option<ActionMask>), EnvError> {
+        let obs = self.reset_with(options, rng)?;
+        let mask = self.action_mask(&obs);
+        Ok((obs.into(), mask))
     }
 
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
         let step = Env::step(self, action, rng);
-        let probability = Env::finite(self)
-            .zip(self.outcome_index(&step.obs))
-            .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
+        let probability = self.probability(&step.obs);
+        let mask = self.action_mask(&step.obs);
         let (reward, terminated) = (step.reward, step.terminated);
-        DynamicStep { obs: step.obs.into(), reward, terminated, probability }
+        DynamicStep { obs: step.obs.into(), reward, terminated, probability, mask }
     }
 
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {
@@ -136,6 +143,10 @@ impl<E: Registered> Dynamic for E {
 
     fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         Env::finite(self)
+    }
+
+    fn n_states(&self) -> Option<usize> {
+        Env::n_states(self)
     }
 }
 
@@ -197,7 +208,15 @@ environments! {
     MountainCar: ["MountainCar-v0", Some(200), Some(-110.0)];
     FrozenLake: ["FrozenLake-v1", Some(100), Some(0.7)],
         ["FrozenLake8x8-v1", Some(200), Some(0.85), "map_name" = "\"8x8\""];
+    CliffWalking: ["CliffWalking-v1", None, None],
+        ["CliffWalkingSlippery-v1", None, None, "is_slippery" = "true"];
+    Taxi: ["Taxi-v4", Some(200), Some(8.0)];
+    Blackjack: ["Blackjack-v1", None, None];
 }
+
+/// Old ids that are still understood: the id, its successor, and why that is the same.
+const ALIASES: &[(&str, &str, &str)] =
+    &[("Taxi-v3", "Taxi-v4", "a dry taxi without fickle passengers is the same in both")];
 
 impl AnyEnv {
     /// Number of discrete actions.
@@ -214,6 +233,11 @@ impl AnyEnv {
     pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         self.dynamic().finite()
     }
+
+    /// Number of its states, if they are finite (with a model or without).
+    pub fn n_states(&self) -> Option<usize> {
+        self.dynamic().n_states()
+    }
 }
 
 /// Every registered environment.
@@ -224,8 +248,8 @@ pub fn specs() -> &'static [EnvSpec] {
 /// Looks up an id; one without a version means the newest.
 ///
 /// # Errors
-/// If there is no such environment: with its successor if the version is an old one, else with
-/// the most similar id.
+/// If there is no such environment: with its successor if the version is an old one (`Taxi-v3` is
+/// understood), else with the most similar id.
 pub fn find(id: &str) -> Result<&'static EnvSpec, EnvError> {
     find_with_note(id).map(|(spec, _)| spec)
 }
@@ -237,6 +261,10 @@ pub fn find(id: &str) -> Result<&'static EnvSpec, EnvError> {
 pub fn find_with_note(id: &str) -> Result<(&'static EnvSpec, Option<String>), EnvError> {
     if let Some(spec) = SPECS.iter().find(|spec| spec.id == id) {
         return Ok((spec, None));
+    }
+    if let Some((old, new, why)) = ALIASES.iter().find(|(old, ..)| *old == id) {
+        let note = format!("Gymnasium 1.4 calls `{old}` `{new}`: {why}");
+        return find(new).map(|spec| (spec, Some(note)));
     }
     let (name, version) = split(id);
     let mut family: Vec<_> = SPECS.iter().filter(|spec| split(spec.id).0 == name).collect();
@@ -307,11 +335,25 @@ mod tests {
             note.as_deref(),
             Some("`CartPole` has no version: using the newest, `CartPole-v1`")
         );
+        let (spec, note) = find_with_note("Taxi-v3").unwrap();
+        assert_eq!(spec.id, "Taxi-v4");
+        assert!(note.unwrap().starts_with("Gymnasium 1.4 calls `Taxi-v3` `Taxi-v4`: "));
         for (id, message) in [
             (
                 "FrozenLake-v0",
                 "version v0 of the environment `FrozenLake` is out of date (use `FrozenLake-v1`)",
             ),
+            (
+                "CliffWalking-v0",
+                "version v0 of the environment `CliffWalking` is out of date (use \
+                 `CliffWalking-v1`)",
+            ),
+            (
+                "Blackjack-v0",
+                "version v0 of the environment `Blackjack` is out of date (use `Blackjack-v1`)",
+            ),
+            ("Taxi-v2", "version v2 of the environment `Taxi` is out of date (use `Taxi-v4`)"),
+            ("Taxi-v5", "there is no `Taxi-v5`; there is `Taxi-v4` (use `Taxi-v4`)"),
             (
                 "CartPole-v2",
                 "there is no `CartPole-v2`; there is `CartPole-v0`, `CartPole-v1` \

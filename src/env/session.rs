@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::error::EnvError;
-use super::registered::Observation;
+use super::registered::{ActionMask, Observation};
 use super::registry::{AnyEnv, EnvSpec, find};
 use crate::mdp::Schema;
 use crate::mdp::numpy::{NumpyRng, Seed};
@@ -34,6 +34,9 @@ pub struct SessionStep {
     /// The probability of this outcome, on finite environments: Gymnasium's `info["prob"]`.
     #[serde(skip)]
     pub probability: Option<f64>,
+    /// Which actions can do anything next, in environments for which Gymnasium says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mask: Option<ActionMask>,
 }
 
 /// An environment, its random stream and its time limit.
@@ -46,6 +49,7 @@ pub struct Session {
     limit: Option<u32>,
     /// Steps since the last reset; `None` before the first one.
     elapsed: Option<u32>,
+    mask: Option<ActionMask>,
 }
 
 impl Session {
@@ -57,7 +61,7 @@ impl Session {
         let spec = find(id)?;
         let env = spec.make(kwargs)?;
         let schema = env.schema();
-        Ok(Self { spec, env, schema, rng: None, limit: spec.max_steps, elapsed: None })
+        Ok(Self { spec, env, schema, rng: None, limit: spec.max_steps, elapsed: None, mask: None })
     }
 
     /// Replaces the time limit: -1 means none.
@@ -82,6 +86,12 @@ impl Session {
     /// The time limit in force.
     pub fn max_episode_steps(&self) -> Option<u32> {
         self.limit
+    }
+
+    /// Which actions can do anything in the present state, in environments for which Gymnasium
+    /// says so (after the first reset).
+    pub fn action_mask(&self) -> Option<&ActionMask> {
+        self.mask.as_ref()
     }
 
     /// Sets an attribute, for example `CartPole`'s `kinematics_integrator`.
@@ -122,7 +132,8 @@ impl Session {
             (None, Some(rng)) => rng.clone(),
             (None, None) => return Err(EnvError::about("seed", "the first reset needs a seed")),
         };
-        let obs = self.env.dynamic_mut().reset(options, &mut rng)?;
+        let (obs, mask) = self.env.dynamic_mut().reset(options, &mut rng)?;
+        self.mask = mask;
         self.rng = Some(rng);
         self.elapsed = Some(0);
         Ok(obs)
@@ -152,12 +163,14 @@ impl Session {
         };
         let step = self.env.dynamic_mut().step(index, rng);
         *elapsed = elapsed.saturating_add(1);
+        self.mask.clone_from(&step.mask);
         Ok(SessionStep {
             obs: step.obs,
             reward: step.reward,
             terminated: step.terminated,
             truncated: self.limit.is_some_and(|limit| *elapsed >= limit),
             probability: step.probability,
+            mask: step.mask,
         })
     }
 }
