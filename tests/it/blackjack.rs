@@ -160,7 +160,7 @@ fn the_game_is_played_as_the_model_says() {
     for rules in RULES {
         let env = Blackjack::new(rules);
         let model = env.finite().unwrap();
-        let sigmas = distances(rules, model, 100_000);
+        let sigmas = distances(rules, model, 200_000);
         assert!(sigmas.iter().all(|sigma| *sigma < 5.0), "{rules:?}: {sigmas:?}");
     }
 }
@@ -169,8 +169,8 @@ fn the_game_is_played_as_the_model_says() {
 fn a_wrong_model_would_be_found() {
     // Only the rows of naturals differ: a draw against three cards is possible or not.
     let (plain, sab) = (Blackjack::new(Rules::Plain), Blackjack::new(Rules::SuttonBarto));
-    let [_, impossible] = distances(Rules::Plain, sab.finite().unwrap(), 100_000);
-    let [_, too_rare] = distances(Rules::SuttonBarto, plain.finite().unwrap(), 100_000);
+    let [_, impossible] = distances(Rules::Plain, sab.finite().unwrap(), 200_000);
+    let [_, too_rare] = distances(Rules::SuttonBarto, plain.finite().unwrap(), 200_000);
     assert!(impossible == f64::INFINITY && too_rare > 5.0, "{impossible}, {too_rare}");
 }
 
