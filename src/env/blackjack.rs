@@ -305,7 +305,7 @@ impl Env for Blackjack {
                 Field::int("natural", "1 if the player has an ace and a ten only, else 0", 0, 1),
             ],
             facts: Vec::new(),
-            actions: &["stick", "hit"],
+            actions: ["stick", "hit"].map(Into::into).into(),
             grid: None,
         }
     }

@@ -166,7 +166,7 @@ impl Env for CliffWalking {
                 fact("goal_row", GOAL / COLS),
                 fact("goal_col", GOAL % COLS),
             ],
-            actions: &["up", "right", "down", "left"],
+            actions: ["up", "right", "down", "left"].map(Into::into).into(),
             grid: Some(Grid {
                 rows: MAP.map(String::from).to_vec(),
                 arrows: &['↑', '→', '↓', '←'],

@@ -2,10 +2,10 @@
 //!
 //! `list`, suggestions, editor definitions, conformance tests and documents iterate [`specs`].
 
-use std::sync::Arc;
-
 use serde_json::{Map, Value};
 
+use super::acrobot::Acrobot;
+use super::any::Dynamic;
 use super::blackjack::Blackjack;
 use super::cart_pole::CartPole;
 use super::cliff_walking::CliffWalking;
@@ -13,10 +13,11 @@ use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
 use super::mountain_car::MountainCar;
-use super::registered::{ActionMask, Example, Observation, Registered};
+use super::mountain_car_continuous::MountainCarContinuous;
+use super::pendulum::Pendulum;
+use super::registered::{Example, Registered};
 use super::taxi::Taxi;
-use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Env, FiniteMdp, Schema};
+use crate::mdp::Env;
 
 /// An environment's id and what Gymnasium registers with it.
 #[derive(Debug)]
@@ -65,7 +66,8 @@ impl EnvSpec {
         Ok(Kwargs::resolve(self.id, &self.kwargs(), given)?.into_map())
     }
 
-    /// Builds the environment.
+    /// Builds the environment with these constructor's arguments; see [`EnvConfig`](super::EnvConfig) for everything
+    /// else that may be said about it.
     ///
     /// # Errors
     /// As [`Self::resolve_kwargs`], and if a value is out of its range.
@@ -82,72 +84,6 @@ pub trait EnvVisitor {
 
     /// Does it.
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out;
-}
-
-/// An environment, seen through a vtable: for sessions, which are dynamic in every step.
-pub(super) trait Dynamic {
-    fn reset(
-        &mut self,
-        options: &Map<String, Value>,
-        rng: &mut NumpyRng,
-    ) -> Result<(Observation, Option<ActionMask>), EnvError>;
-    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
-    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
-    fn n_actions(&self) -> usize;
-    fn schema(&self) -> Schema;
-    fn finite(&self) -> Option<&Arc<FiniteMdp>>;
-    fn n_states(&self) -> Option<usize>;
-}
-
-/// What [`Dynamic::step`] returns.
-pub(super) struct DynamicStep {
-    pub(super) obs: Observation,
-    pub(super) reward: f64,
-    pub(super) terminated: bool,
-    /// The probability of the outcome, on finite environments.
-    pub(super) probability: Option<f64>,
-    /// Which actions can do anything next, where Gymnasium says so.
-    pub(super) mask: Option<ActionMask>,
-}
-
-impl<E: Registered> Dynamic for E {
-    fn reset(
-        &mut self,
-        options: &Map<String, Value>,
-        rng: &mut NumpyRng,
-    ) -> Result<(Observation, Option<ActionMask>), EnvError> {
-        let obs = self.reset_with(options, rng)?;
-        let mask = self.action_mask(&obs);
-        Ok((obs.into(), mask))
-    }
-
-    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
-        let step = Env::step(self, action, rng);
-        let probability = self.probability(&step.obs);
-        let mask = self.action_mask(&step.obs);
-        let (reward, terminated) = (step.reward, step.terminated);
-        DynamicStep { obs: step.obs.into(), reward, terminated, probability, mask }
-    }
-
-    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {
-        Registered::set_attribute(self, name, value)
-    }
-
-    fn n_actions(&self) -> usize {
-        Env::n_actions(self)
-    }
-
-    fn schema(&self) -> Schema {
-        Env::schema(self)
-    }
-
-    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
-        Env::finite(self)
-    }
-
-    fn n_states(&self) -> Option<usize> {
-        Env::n_states(self)
-    }
 }
 
 /// Generates [`AnyEnv`] and the list of specs from entries of the form
@@ -206,6 +142,9 @@ macro_rules! environments {
 environments! {
     CartPole: ["CartPole-v0", Some(200), Some(195.0)], ["CartPole-v1", Some(500), Some(475.0)];
     MountainCar: ["MountainCar-v0", Some(200), Some(-110.0)];
+    MountainCarContinuous: ["MountainCarContinuous-v0", Some(999), Some(90.0)];
+    Acrobot: ["Acrobot-v1", Some(500), Some(-100.0)];
+    Pendulum: ["Pendulum-v1", Some(200), None];
     FrozenLake: ["FrozenLake-v1", Some(100), Some(0.7)],
         ["FrozenLake8x8-v1", Some(200), Some(0.85), "map_name" = "\"8x8\""];
     CliffWalking: ["CliffWalking-v1", None, None],
@@ -217,28 +156,6 @@ environments! {
 /// Old ids that are still understood: the id, its successor, and why that is the same.
 const ALIASES: &[(&str, &str, &str)] =
     &[("Taxi-v3", "Taxi-v4", "a dry taxi without fickle passengers is the same in both")];
-
-impl AnyEnv {
-    /// Number of discrete actions.
-    pub fn n_actions(&self) -> usize {
-        self.dynamic().n_actions()
-    }
-
-    /// How scripts name its states.
-    pub fn schema(&self) -> Schema {
-        self.dynamic().schema()
-    }
-
-    /// Its model, if it has a finite one.
-    pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
-        self.dynamic().finite()
-    }
-
-    /// Number of its states, if they are finite (with a model or without).
-    pub fn n_states(&self) -> Option<usize> {
-        self.dynamic().n_states()
-    }
-}
 
 /// Every registered environment.
 pub fn specs() -> &'static [EnvSpec] {

@@ -217,7 +217,7 @@ impl Env for Taxi {
                 ("rows", FieldKind::Int, ROWS as f64),
                 ("cols", FieldKind::Int, COLS as f64),
             ],
-            actions: &["south", "north", "east", "west", "pickup", "dropoff"],
+            actions: ["south", "north", "east", "west", "pickup", "dropoff"].map(Into::into).into(),
             grid: None,
         }
     }
