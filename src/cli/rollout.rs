@@ -4,10 +4,11 @@ use std::path::Path;
 
 use clap::Args as ClapArgs;
 
+use super::output::note;
 use super::view::{View, ViewArgs};
 use super::{Failure, Outcome};
 use crate::env::rollout::{Event, Length, drive, parse_actions, random_policy};
-use crate::env::{PlayedAction, Session};
+use crate::env::{PlayedAction, Session, find_with_note};
 use crate::experiment::play::{Policy, play};
 use crate::experiment::read_table;
 use crate::mdp::numpy::Seed;
@@ -49,7 +50,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let seed: Seed =
         args.seed.parse().map_err(|e| Failure::Message(format!("--seed: {e}"), None))?;
-    let mut session = Session::new(&args.env, &kwargs)?;
+    let (spec, remark) = find_with_note(&args.env)?;
+    if let Some(remark) = remark {
+        note(&remark);
+    }
+    let mut session = Session::new(spec.id, &kwargs)?;
     let actions = match &args.actions {
         Some(actions) => Some(parse_actions(actions, &session.action_space())?),
         None => None,

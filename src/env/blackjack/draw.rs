@@ -1,6 +1,6 @@
 //! The table: the dealer's cards above, the player's below, and what they count.
 
-use super::Blackjack;
+use super::{Blackjack, STICK};
 use crate::env::actions::PlayedAction;
 use crate::env::scene::palette::{BLUE, FELT, INK, RED, SLATE, WHITE, YELLOW};
 use crate::env::scene::{Draw, Item, Point, Scene, Shape, Span, Sprite, TextPicture};
@@ -15,8 +15,6 @@ const DEALER: f64 = 3.2;
 const PLAYER: f64 = 1.1;
 /// The pack from which cards come.
 const PACK: Point = [7.4, 3.2];
-/// The index of the action that ends the player's turn.
-const STICK: i64 = 0;
 
 impl Draw for Blackjack {
     const FPS: u32 = 2;
@@ -30,7 +28,8 @@ impl Draw for Blackjack {
         }
         let open = shows(last);
         let (dealer, player) = self.labels(open);
-        for (y, words) in [(DEALER, ["dealer".into(), dealer]), (PLAYER, ["player".into(), player])] {
+        for (y, words) in [(DEALER, ["dealer".into(), dealer]), (PLAYER, ["player".into(), player])]
+        {
             for (up, text) in [0.2, -0.2].into_iter().zip(words) {
                 scene.add(Shape::text([0.9, y + up], 0.34, WHITE, text));
             }
@@ -83,7 +82,7 @@ impl Blackjack {
 
 /// Whether the dealer has turned the hidden card over.
 fn shows(last: Option<&PlayedAction>) -> bool {
-    last == Some(&PlayedAction::Index(STICK))
+    last == Some(&PlayedAction::Index(STICK as i64))
 }
 
 fn rank(card: u8) -> String {
@@ -135,9 +134,9 @@ fn hand(name: &str, ranks: &[Option<String>], count: &str) -> Vec<Vec<Span>> {
     let mut line = vec![Span::plain(format!("{name}  ")), Span::of("│", SLATE)];
     for rank in ranks {
         line.push(match rank {
-            Some(rank) => Span::of(format!("{rank:^3}"), if rank == "A" { RED } else { INK })
-                .on(WHITE)
-                .bold(),
+            Some(rank) => {
+                Span::of(format!("{rank:^3}"), if rank == "A" { RED } else { INK }).on(WHITE).bold()
+            }
             None => Span::of("░░░", WHITE).on(BLUE),
         });
         line.push(Span::of("│", SLATE));
