@@ -75,8 +75,12 @@ impl Blackjack {
     /// What the hands count.
     fn labels(&self, open: bool) -> (String, String) {
         let dealer = self.dealer_cards();
-        let visible = if open { dealer } else { &dealer[..dealer.len().min(1)] };
-        (count(visible), count(self.player_cards()))
+        let dealer = match dealer.first() {
+            Some(1) if !open => "A + ?".into(),
+            Some(first) if !open => format!("{first} + ?"),
+            _ => count(dealer),
+        };
+        (dealer, count(self.player_cards()))
     }
 }
 
