@@ -5,8 +5,8 @@ use std::io::Write;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::{Failure, Outcome};
-use crate::env::rollout::{RolloutError, parse_actions, rollout, rollout_actions};
-use crate::env::{Observation, Session};
+use crate::env::Session;
+use crate::env::rollout::{RolloutError, parse_actions, random_policy, rollout, rollout_actions};
 use crate::mdp::numpy::Seed;
 use crate::mdp::streams::Stream;
 
@@ -20,7 +20,7 @@ pub(super) struct Args {
     /// Seed of the first reset, as in Gymnasium's reset(seed=N)
     #[arg(long, value_name = "N", default_value = "0")]
     seed: String,
-    /// Actions to play, separated by commas
+    /// Actions to play, separated by commas; `[a,b],..` where one is a list of numbers
     #[arg(long, value_name = "A,B,..", conflicts_with = "policy", allow_hyphen_values = true)]
     actions: Option<String>,
     /// Who plays if no actions are given
@@ -62,13 +62,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
     let (Format::Jsonl, Policy::Random) = (args.format, args.policy);
     let played = if let Some(actions) = &args.actions {
-        let actions = parse_actions(actions)?;
+        let actions = parse_actions(actions, &session.action_space())?;
         rollout_actions(&mut session, &seed, &actions, &mut stdout)
     } else {
-        let n_actions = session.schema().actions.len();
-        let mut stream = Stream::new(seed.words()[0].into(), "policy");
-        let policy = |_: &Observation| stream.below(n_actions) as i64;
-        rollout(&mut session, &seed, args.steps, policy, &mut stdout)
+        let stream = Stream::new(seed.words()[0].into(), "policy");
+        let mut policy = random_policy(&session, stream);
+        rollout(&mut session, &seed, args.steps, |_| policy(), &mut stdout)
     };
     let flushed = stdout.flush();
     match played {

@@ -1,4 +1,5 @@
-//! The reset options `low` and `high` of the classic-control environments.
+//! The reset options of the classic-control environments: `low` and `high`, or one that is the end
+//! of a symmetric range.
 //!
 //! Deviations from Gymnasium:
 //! 1. An unknown option is an error; Gymnasium ignores it.
@@ -43,6 +44,28 @@ pub(super) fn parse(
     Ok((low, high))
 }
 
+/// The end x of the symmetric range [-x, x] that the option `key` gives, else `default`.
+///
+/// # Errors
+/// If the value is no number, or not in 0 to half the largest finite one.
+pub(super) fn symmetric(
+    options: &Map<String, Value>,
+    key: &str,
+    default: f64,
+) -> Result<f64, EnvError> {
+    let Some(value) = options.get(key) else { return Ok(default) };
+    let refuse = |what: &str| {
+        let message = format!("the reset option `{key}` must be a number{what}, not {value}");
+        EnvError::about(key, message)
+    };
+    let end = number(value).ok_or_else(|| refuse(""))?;
+    if end >= 0.0 && (end + end).is_finite() {
+        Ok(end)
+    } else {
+        Err(refuse(" of 0 or more that spans a finite range"))
+    }
+}
+
 /// What Python's `float()` makes of a JSON value.
 fn number(value: &Value) -> Option<f64> {
     match value {
@@ -70,6 +93,23 @@ mod tests {
         assert_eq!(parse_json(&json!({"low": "-0.2"})), Ok((-0.2, 0.05)));
         assert_eq!(parse_json(&json!({"low": 0.0, "high": 0})), Ok((0.0, 0.0)));
         assert_eq!(parse_json(&json!({"high": true})), Ok((-0.05, 1.0)));
+    }
+
+    #[test]
+    fn symmetric_ranges_are_checked() {
+        let parse = |value: Value| {
+            let options = json!({"x_init": value});
+            symmetric(options.as_object().unwrap(), "x_init", 3.0).map_err(|e| e.message)
+        };
+        assert_eq!(parse(json!(0)), Ok(0.0));
+        assert_eq!(parse(json!("0.5")), Ok(0.5));
+        assert_eq!(symmetric(&Map::new(), "x_init", 3.0).unwrap(), 3.0);
+        let message = |rest: &str| Err(format!("the reset option `x_init` must be a number{rest}"));
+        assert_eq!(parse(json!([])), message(", not []"));
+        let range = " of 0 or more that spans a finite range, not ";
+        for value in [json!(-1), json!("inf"), json!("nan"), json!(1e308)] {
+            assert_eq!(parse(value.clone()), message(&format!("{range}{value}")));
+        }
     }
 
     #[test]

@@ -83,6 +83,8 @@ pub struct CartPole {
     theta_dot: f64,
     /// Whether this episode has seen a terminated step: further ones pay nothing.
     fallen: bool,
+    /// The range of every number of the starting state.
+    start: (f64, f64),
     sutton_barto_reward: bool,
     semi_implicit: bool,
 }
@@ -96,6 +98,7 @@ impl CartPole {
             theta: 0.0,
             theta_dot: 0.0,
             fallen: false,
+            start: START,
             sutton_barto_reward,
             semi_implicit: false,
         }
@@ -105,17 +108,6 @@ impl CartPole {
     /// of the explicit one.
     pub fn set_semi_implicit(&mut self, semi_implicit: bool) {
         self.semi_implicit = semi_implicit;
-    }
-
-    /// Starts an episode with every number of the state uniform in `low..high`.
-    #[inline]
-    pub fn reset_between(&mut self, low: f64, high: f64, rng: &mut NumpyRng) -> [f32; 4] {
-        self.x = rng.uniform(low, high);
-        self.x_dot = rng.uniform(low, high);
-        self.theta = rng.uniform(low, high);
-        self.theta_dot = rng.uniform(low, high);
-        self.fallen = false;
-        self.obs()
     }
 
     #[inline]
@@ -146,7 +138,13 @@ impl Env for CartPole {
 
     #[inline]
     fn reset(&mut self, rng: &mut NumpyRng) -> [f32; 4] {
-        self.reset_between(START.0, START.1, rng)
+        let (low, high) = self.start;
+        self.x = rng.uniform(low, high);
+        self.x_dot = rng.uniform(low, high);
+        self.theta = rng.uniform(low, high);
+        self.theta_dot = rng.uniform(low, high);
+        self.fallen = false;
+        self.obs()
     }
 
     #[inline]
@@ -192,7 +190,7 @@ impl Env for CartPole {
                 field("theta_dot", "angular velocity of the pole, rad/s", f64::INFINITY),
             ],
             facts: Vec::new(),
-            actions: &["left", "right"],
+            actions: ["left", "right"].map(Into::into).into(),
             grid: None,
         }
     }
@@ -228,13 +226,9 @@ impl Registered for CartPole {
         Ok(Self::new(kwargs.bool("sutton_barto_reward")))
     }
 
-    fn reset_with(
-        &mut self,
-        options: &Map<String, Value>,
-        rng: &mut NumpyRng,
-    ) -> Result<[f32; 4], EnvError> {
-        let (low, high) = bounds::parse(options, START)?;
-        Ok(self.reset_between(low, high, rng))
+    fn set_reset_options(&mut self, options: &Map<String, Value>) -> Result<(), EnvError> {
+        self.start = bounds::parse(options, START)?;
+        Ok(())
     }
 
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {

@@ -285,7 +285,7 @@ impl Env for FrozenLake {
                 },
             ],
             facts,
-            actions: &["left", "down", "right", "up"],
+            actions: ["left", "down", "right", "up"].map(Into::into).into(),
             grid: Some(Grid {
                 rows: tiles.chunks(cols).map(text).collect(),
                 arrows: &['←', '↓', '→', '↑'],

@@ -2,25 +2,37 @@
 //!
 //! - [`registry`]: [`specs`], [`find`], [`make`]: from an id and arguments to an [`AnyEnv`], and by
 //!   an [`EnvVisitor`] to static dispatch
-//! - [`cart_pole`], [`mountain_car`], [`frozen_lake`]: the dynamics, documented under Gymnasium's
+//! - [`cart_pole`], [`mountain_car`], [`mountain_car_continuous`], [`acrobot`], [`pendulum`],
+//!   [`frozen_lake`]: the dynamics, documented under Gymnasium's
 //!   headings
 //! - [`Registered`]: what an environment provides beyond its dynamics; [`KwargSpec`], [`Kwargs`]:
 //!   its constructor's arguments; [`EnvError`]: what can be wrong with them
+//! - [`ActionTable`]: real-valued actions for agents that choose among a few; [`PlayedAction`]: an
+//!   action of either kind
+//! - [`EnvConfig`]: everything that may be said about an instance
 //! - [`Session`]: an environment as `gymnasium.make` returns it, dynamic, with its time limit
 //! - [`rollout`]: an episode as JSON lines; [`recording`]: replaying recorded trajectories
 
+pub mod acrobot;
+mod actions;
+mod any;
 mod bounds;
 pub mod cart_pole;
+mod config;
 mod error;
 pub mod frozen_lake;
 mod kwargs;
 pub mod mountain_car;
+pub mod mountain_car_continuous;
+pub mod pendulum;
 pub mod recording;
 mod registered;
 pub mod registry;
 pub mod rollout;
 mod session;
 
+pub use actions::{ActionTable, MAX_ACTIONS, PlayedAction};
+pub use config::EnvConfig;
 pub use error::EnvError;
 pub use kwargs::{KwargKind, KwargSpec, Kwargs};
 pub use registered::{Example, Observation, Registered};

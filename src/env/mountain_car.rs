@@ -58,21 +58,15 @@ const START: (f64, f64) = (-0.6, -0.4);
 pub struct MountainCar {
     position: f64,
     velocity: f64,
+    /// The range of the starting position.
+    start: (f64, f64),
     goal_velocity: f64,
 }
 
 impl MountainCar {
     /// A car at rest in the middle of the starting range until the first reset.
     pub fn new(goal_velocity: f64) -> Self {
-        Self { position: -0.5, velocity: 0.0, goal_velocity }
-    }
-
-    /// Starts an episode at rest, at a position uniform in `low..high`.
-    #[inline]
-    pub fn reset_between(&mut self, low: f64, high: f64, rng: &mut NumpyRng) -> [f32; 2] {
-        self.position = rng.uniform(low, high);
-        self.velocity = 0.0;
-        self.obs()
+        Self { position: -0.5, velocity: 0.0, start: START, goal_velocity }
     }
 
     #[inline]
@@ -90,7 +84,10 @@ impl Env for MountainCar {
 
     #[inline]
     fn reset(&mut self, rng: &mut NumpyRng) -> [f32; 2] {
-        self.reset_between(START.0, START.1, rng)
+        let (low, high) = self.start;
+        self.position = rng.uniform(low, high);
+        self.velocity = 0.0;
+        self.obs()
     }
 
     #[inline]
@@ -129,7 +126,7 @@ impl Env for MountainCar {
                 },
             ],
             facts: Vec::new(),
-            actions: &["left", "none", "right"],
+            actions: ["left", "none", "right"].map(Into::into).into(),
             grid: None,
         }
     }
@@ -163,13 +160,9 @@ impl Registered for MountainCar {
         Ok(Self::new(kwargs.float("goal_velocity")))
     }
 
-    fn reset_with(
-        &mut self,
-        options: &Map<String, Value>,
-        rng: &mut NumpyRng,
-    ) -> Result<[f32; 2], EnvError> {
-        let (low, high) = bounds::parse(options, START)?;
-        Ok(self.reset_between(low, high, rng))
+    fn set_reset_options(&mut self, options: &Map<String, Value>) -> Result<(), EnvError> {
+        self.start = bounds::parse(options, START)?;
+        Ok(())
     }
 }
 
@@ -213,7 +206,7 @@ mod tests {
             (1, [-0.3337, 0.0253], [0xbfd3_d2eb_1fea_81e5, 0x3f98_86c1_ec0b_4950]),
         ];
         for (action, [position, velocity], bits) in steps {
-            let mut env = MountainCar { position, velocity, goal_velocity: 0.0 };
+            let mut env = MountainCar { position, velocity, ..MountainCar::new(0.0) };
             env.step(action, &mut rng());
             assert_eq!([env.position, env.velocity].map(f64::to_bits), bits);
         }

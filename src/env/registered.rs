@@ -3,9 +3,9 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::actions::ActionTable;
 use super::error::EnvError;
 use super::kwargs::{KwargSpec, Kwargs};
-use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Env, FiniteState};
 
 /// An observation whose type is known at run time only. Serialises as Gymnasium's would: a bare
@@ -63,18 +63,22 @@ pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
     /// If a value is out of its range.
     fn from_kwargs(kwargs: &Kwargs) -> Result<Self, EnvError>;
 
-    /// Starts an episode with Gymnasium's `options`, all of them in [`Self::RESET_OPTIONS`].
-    /// Draws nothing if they are wrong.
+    /// Sets Gymnasium's reset `options` for the resets to come: those given, all of them in
+    /// [`Self::RESET_OPTIONS`], and the defaults of the others. Changes nothing if they are wrong.
     ///
     /// # Errors
     /// If an option's value is not allowed.
-    fn reset_with(
-        &mut self,
-        _options: &Map<String, Value>,
-        rng: &mut NumpyRng,
-    ) -> Result<Self::Obs, EnvError> {
-        Ok(self.reset(rng))
+    fn set_reset_options(&mut self, _options: &Map<String, Value>) -> Result<(), EnvError> {
+        Ok(())
     }
+
+    /// Where actions are real numbers: the ones that agents choose among.
+    fn action_table(&self) -> Option<&ActionTable> {
+        None
+    }
+
+    /// Replaces [`Self::action_table`]; only called where there is one, with a table for its box.
+    fn set_action_table(&mut self, _table: ActionTable) {}
 
     /// Sets an attribute, one of [`Self::ATTRIBUTES`].
     ///

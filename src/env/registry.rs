@@ -2,18 +2,19 @@
 //!
 //! `list`, suggestions, editor definitions, conformance tests and documents iterate [`specs`].
 
-use std::sync::Arc;
-
 use serde_json::{Map, Value};
 
+use super::acrobot::Acrobot;
+use super::any::Dynamic;
 use super::cart_pole::CartPole;
 use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
 use super::mountain_car::MountainCar;
-use super::registered::{Example, Observation, Registered};
-use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Env, FiniteMdp, Schema};
+use super::mountain_car_continuous::MountainCarContinuous;
+use super::pendulum::Pendulum;
+use super::registered::{Example, Registered};
+use crate::mdp::Env;
 
 /// An environment's id and what Gymnasium registers with it.
 #[derive(Debug)]
@@ -62,7 +63,8 @@ impl EnvSpec {
         Ok(Kwargs::resolve(self.id, &self.kwargs(), given)?.into_map())
     }
 
-    /// Builds the environment.
+    /// Builds the environment with these constructor's arguments; see [`EnvConfig`](super::EnvConfig) for everything
+    /// else that may be said about it.
     ///
     /// # Errors
     /// As [`Self::resolve_kwargs`], and if a value is out of its range.
@@ -79,64 +81,6 @@ pub trait EnvVisitor {
 
     /// Does it.
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out;
-}
-
-/// An environment, seen through a vtable: for sessions, which are dynamic in every step.
-pub(super) trait Dynamic {
-    fn reset(
-        &mut self,
-        options: &Map<String, Value>,
-        rng: &mut NumpyRng,
-    ) -> Result<Observation, EnvError>;
-    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
-    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
-    fn n_actions(&self) -> usize;
-    fn schema(&self) -> Schema;
-    fn finite(&self) -> Option<&Arc<FiniteMdp>>;
-}
-
-/// What [`Dynamic::step`] returns.
-pub(super) struct DynamicStep {
-    pub(super) obs: Observation,
-    pub(super) reward: f64,
-    pub(super) terminated: bool,
-    /// The probability of the outcome, on finite environments.
-    pub(super) probability: Option<f64>,
-}
-
-impl<E: Registered> Dynamic for E {
-    fn reset(
-        &mut self,
-        options: &Map<String, Value>,
-        rng: &mut NumpyRng,
-    ) -> Result<Observation, EnvError> {
-        Ok(self.reset_with(options, rng)?.into())
-    }
-
-    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
-        let step = Env::step(self, action, rng);
-        let probability = Env::finite(self)
-            .zip(self.outcome_index(&step.obs))
-            .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
-        let (reward, terminated) = (step.reward, step.terminated);
-        DynamicStep { obs: step.obs.into(), reward, terminated, probability }
-    }
-
-    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {
-        Registered::set_attribute(self, name, value)
-    }
-
-    fn n_actions(&self) -> usize {
-        Env::n_actions(self)
-    }
-
-    fn schema(&self) -> Schema {
-        Env::schema(self)
-    }
-
-    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
-        Env::finite(self)
-    }
 }
 
 /// Generates [`AnyEnv`] and the list of specs from entries of the form
@@ -195,25 +139,11 @@ macro_rules! environments {
 environments! {
     CartPole: ["CartPole-v0", Some(200), Some(195.0)], ["CartPole-v1", Some(500), Some(475.0)];
     MountainCar: ["MountainCar-v0", Some(200), Some(-110.0)];
+    MountainCarContinuous: ["MountainCarContinuous-v0", Some(999), Some(90.0)];
+    Acrobot: ["Acrobot-v1", Some(500), Some(-100.0)];
+    Pendulum: ["Pendulum-v1", Some(200), None];
     FrozenLake: ["FrozenLake-v1", Some(100), Some(0.7)],
         ["FrozenLake8x8-v1", Some(200), Some(0.85), "map_name" = "\"8x8\""];
-}
-
-impl AnyEnv {
-    /// Number of discrete actions.
-    pub fn n_actions(&self) -> usize {
-        self.dynamic().n_actions()
-    }
-
-    /// How scripts name its states.
-    pub fn schema(&self) -> Schema {
-        self.dynamic().schema()
-    }
-
-    /// Its model, if it has a finite one.
-    pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
-        self.dynamic().finite()
-    }
 }
 
 /// Every registered environment.

@@ -6,17 +6,20 @@
 //! ```
 //!
 //! After an episode has ended, the next action starts another one with an unseeded reset, whose
-//! line has `"seed":null`.
+//! line has `"seed":null`. Where actions are real numbers, `action` is a list.
 
 use std::fmt;
 use std::io::{self, Write};
 
 use serde::Serialize;
 
+use super::actions::PlayedAction;
 use super::error::EnvError;
 use super::registered::Observation;
 use super::session::{Session, SessionStep};
+use crate::mdp::ActionSpace;
 use crate::mdp::numpy::Seed;
+use crate::mdp::streams::Stream;
 
 /// Why a rollout stopped early.
 #[derive(Debug)]
@@ -53,7 +56,7 @@ impl From<io::Error> for RolloutError {
 #[derive(Serialize)]
 struct StepLine<'a> {
     r#type: &'static str,
-    action: i64,
+    action: &'a PlayedAction,
     #[serde(flatten)]
     step: &'a SessionStep,
 }
@@ -68,7 +71,7 @@ pub fn rollout(
     session: &mut Session,
     seed: &Seed,
     steps: usize,
-    mut policy: impl FnMut(&Observation) -> i64,
+    mut policy: impl FnMut(&Observation) -> PlayedAction,
     out: &mut dyn Write,
 ) -> Result<(), RolloutError> {
     let mut obs = session.reset(Some(seed), None)?;
@@ -80,12 +83,15 @@ pub fn rollout(
             write_reset(out, None, &obs)?;
         }
         let action = policy(&obs);
-        let step = session.step(action).map_err(|mut error| {
+        let step = session.step(&action).map_err(|mut error| {
             error.message = format!("at step {i}: {}", error.message);
             error
         })?;
-        serde_json::to_writer(&mut *out, &StepLine { r#type: "step", action, step: &step })
-            .map_err(io::Error::from)?;
+        serde_json::to_writer(
+            &mut *out,
+            &StepLine { r#type: "step", action: &action, step: &step },
+        )
+        .map_err(io::Error::from)?;
         out.write_all(b"\n")?;
         ended = step.terminated || step.truncated;
         obs = step.obs;
@@ -100,36 +106,79 @@ pub fn rollout(
 pub fn rollout_actions(
     session: &mut Session,
     seed: &Seed,
-    actions: &[i64],
+    actions: &[PlayedAction],
     out: &mut dyn Write,
 ) -> Result<(), RolloutError> {
-    let mut next = actions.iter().copied();
+    let mut next = actions.iter().cloned();
     // There are exactly as many calls as actions.
-    rollout(session, seed, actions.len(), |_| next.next().unwrap_or(-1), out)
+    rollout(session, seed, actions.len(), |_| next.next().unwrap_or(PlayedAction::Index(-1)), out)
 }
 
-/// Reads `0,1,1`: integers separated by commas, with blanks allowed. An empty text is an empty
-/// list.
+/// Uniformly random actions for `session`: an index, or numbers between the bounds of its box.
+pub fn random_policy(
+    session: &Session,
+    mut stream: Stream,
+) -> impl FnMut() -> PlayedAction + use<> {
+    let space = session.action_space();
+    move || match space {
+        ActionSpace::Discrete(n) => PlayedAction::Index(stream.below(n) as i64),
+        ActionSpace::Box { low, high } => PlayedAction::Box(
+            low.iter()
+                .zip(high)
+                .map(|(&low, &high)| {
+                    let (low, high) = (f64::from(low), f64::from(high));
+                    f64::from((low + (high - low) * stream.uniform()) as f32)
+                })
+                .collect(),
+        ),
+    }
+}
+
+/// Reads actions separated by commas, with blanks allowed: `0,1,1`, or, where actions are real
+/// numbers, lists `[0.5,-1],[1,0]` (a single number may do without its brackets: `0.5,-1`). An
+/// empty text is an empty list.
 ///
 /// # Errors
-/// If a part is no integer.
-pub fn parse_actions(text: &str) -> Result<Vec<i64>, EnvError> {
+/// If a part is no action of `space`'s kind.
+pub fn parse_actions(text: &str, space: &ActionSpace) -> Result<Vec<PlayedAction>, EnvError> {
     if text.trim().is_empty() {
         return Ok(Vec::new());
     }
-    text.split(',')
+    split_actions(text)
         .enumerate()
         .map(|(i, part)| {
-            part.trim().parse().map_err(|_| {
+            let part = part.trim();
+            let (expected, action) = match space {
+                ActionSpace::Discrete(_) => {
+                    ("integers", part.parse().ok().map(PlayedAction::Index))
+                }
+                ActionSpace::Box { low, .. } => {
+                    let bare = (low.len() == 1).then(|| part.parse().ok()).flatten();
+                    let list = bare.map(|x| vec![x]).or_else(|| serde_json::from_str(part).ok());
+                    (
+                        if low.len() == 1 { "numbers" } else { "lists of numbers [a, b]" },
+                        list.map(PlayedAction::Box),
+                    )
+                }
+            };
+            action.ok_or_else(|| {
+                let n = i + 1;
                 let message = format!(
-                    "actions are integers separated by commas, but number {} is `{}`",
-                    i + 1,
-                    part.trim()
+                    "actions are {expected} separated by commas, but number {n} is `{part}`"
                 );
                 EnvError::about("actions", message)
             })
         })
         .collect()
+}
+
+/// The parts of `text` between commas that stand outside brackets.
+fn split_actions(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0i32;
+    text.split(move |c: char| {
+        depth += i32::from(c == '[') - i32::from(c == ']');
+        c == ',' && depth <= 0
+    })
 }
 
 fn write_reset(out: &mut dyn Write, seed: Option<&Seed>, obs: &Observation) -> io::Result<()> {
@@ -148,7 +197,7 @@ mod tests {
     fn play(id: &str, kwargs: &serde_json::Value, seed: &str, actions: &str) -> String {
         let mut session = Session::new(id, kwargs.as_object().unwrap()).unwrap();
         let mut out = Vec::new();
-        let actions = parse_actions(actions).unwrap();
+        let actions = parse_actions(actions, &session.action_space()).unwrap();
         rollout_actions(&mut session, &seed.parse().unwrap(), &actions, &mut out).unwrap();
         String::from_utf8(out).unwrap()
     }
@@ -188,15 +237,38 @@ mod tests {
     fn mistakes_are_located() {
         let mut session = Session::new("CartPole-v1", &Map::new()).unwrap();
         let mut out = Vec::new();
-        let error = rollout_actions(&mut session, &Seed::from(0), &[0, 7], &mut out).unwrap_err();
+        let error = rollout_actions(&mut session, &Seed::from(0), &[0.into(), 7.into()], &mut out)
+            .unwrap_err();
         assert_eq!(
             error.to_string(),
             "at step 1: CartPole-v1 has no action 7: its actions are 0 (left), 1 (right)"
         );
         assert_eq!(String::from_utf8(out).unwrap().lines().count(), 2);
-        assert_eq!(
-            parse_actions("0,x,1").unwrap_err().message,
-            "actions are integers separated by commas, but number 2 is `x`"
-        );
+    }
+
+    #[test]
+    fn actions_are_read_by_the_kind_of_the_space() {
+        let parse = |text: &str, space| parse_actions(text, &space).map_err(|e| e.message);
+        let discrete = ActionSpace::Discrete(4);
+        let one = ActionSpace::Box { low: &[-1.0], high: &[1.0] };
+        let two = ActionSpace::Box { low: &[-1.0; 2], high: &[1.0; 2] };
+        let boxed = |lists: &[&[f64]]| {
+            Ok(lists.iter().map(|list| PlayedAction::Box(list.to_vec())).collect::<Vec<_>>())
+        };
+        assert_eq!(parse("3, 0", discrete), Ok(vec![3.into(), 0.into()]));
+        assert_eq!(parse("0.5, -1,[0]", one), boxed(&[&[0.5], &[-1.0], &[0.0]]));
+        assert_eq!(parse("[0.5,-1], [1, 0]", two), boxed(&[&[0.5, -1.0], &[1.0, 0.0]]));
+        for (text, space, message) in [
+            ("0,x,1", discrete, "actions are integers separated by commas, but number 2 is `x`"),
+            ("0,0.5", discrete, "actions are integers separated by commas, but number 2 is `0.5`"),
+            ("0.5,x", one, "actions are numbers separated by commas, but number 2 is `x`"),
+            (
+                "[1,0],0.5",
+                two,
+                "actions are lists of numbers [a, b] separated by commas, but number 2 is `0.5`",
+            ),
+        ] {
+            assert_eq!(parse(text, space).unwrap_err(), message);
+        }
     }
 }

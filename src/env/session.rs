@@ -13,11 +13,13 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::actions::{ActionTable, PlayedAction, checked_box};
+use super::config::EnvConfig;
 use super::error::EnvError;
 use super::registered::Observation;
 use super::registry::{AnyEnv, EnvSpec, find};
-use crate::mdp::Schema;
 use crate::mdp::numpy::{NumpyRng, Seed};
+use crate::mdp::{ActionSpace, Schema};
 
 /// What one step of a [`Session`] brought.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,6 +46,8 @@ pub struct Session {
     schema: Schema,
     rng: Option<NumpyRng>,
     limit: Option<u32>,
+    /// The reset options of a reset that gives none.
+    reset_options: Map<String, Value>,
     /// Steps since the last reset; `None` before the first one.
     elapsed: Option<u32>,
 }
@@ -54,10 +58,18 @@ impl Session {
     /// # Errors
     /// If the id or an argument is wrong.
     pub fn new(id: &str, kwargs: &Map<String, Value>) -> Result<Self, EnvError> {
-        let spec = find(id)?;
-        let env = spec.make(kwargs)?;
+        Self::of(find(id)?, &EnvConfig { kwargs: kwargs.clone(), ..EnvConfig::default() })
+    }
+
+    /// Makes the environment that `spec` and `config` describe, with its time limit.
+    ///
+    /// # Errors
+    /// As [`EnvSpec::build`].
+    pub fn of(spec: &'static EnvSpec, config: &EnvConfig) -> Result<Self, EnvError> {
+        let env = spec.build(config)?;
         let schema = env.schema();
-        Ok(Self { spec, env, schema, rng: None, limit: spec.max_steps, elapsed: None })
+        let (limit, reset_options) = (spec.max_steps, config.reset_options.clone());
+        Ok(Self { spec, env, schema, rng: None, limit, reset_options, elapsed: None })
     }
 
     /// Replaces the time limit: -1 means none.
@@ -79,6 +91,29 @@ impl Session {
         &self.schema
     }
 
+    /// What actions it takes.
+    pub fn action_space(&self) -> ActionSpace {
+        self.env.action_space()
+    }
+
+    /// Where actions are real numbers: the ones that agents choose among.
+    pub fn action_table(&self) -> Option<&ActionTable> {
+        self.env.action_table()
+    }
+
+    /// The action that an agent means by `index`: itself, or the entry of [`Self::action_table`].
+    ///
+    /// # Panics
+    /// If there is no such entry.
+    pub fn action(&self, index: usize) -> PlayedAction {
+        match self.action_table() {
+            None => PlayedAction::Index(index as i64),
+            Some(table) => {
+                PlayedAction::Box(table.get(index).iter().map(|&x| f64::from(x)).collect())
+            }
+        }
+    }
+
     /// The time limit in force.
     pub fn max_episode_steps(&self) -> Option<u32> {
         self.limit
@@ -90,19 +125,15 @@ impl Session {
     /// If the environment has no such attribute, the value is not allowed, or the session has
     /// been reset already.
     pub fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {
-        let spec = self.spec;
-        if !spec.attributes.contains(&name) {
-            return Err(EnvError::unknown_key(spec.id, "attributes", name, spec.attributes));
-        }
-        if self.elapsed.is_some() {
+        if self.elapsed.is_some() && self.spec.attributes.contains(&name) {
             let message = format!("`{name}` must be set before the first reset");
             return Err(EnvError::about(name, message));
         }
-        self.env.dynamic_mut().set_attribute(name, value)
+        self.spec.set_attribute(&mut self.env, name, value)
     }
 
-    /// Starts an episode. A seed starts a fresh random stream, no seed continues the one there is.
-    /// A failed reset changes nothing.
+    /// Starts an episode. A seed starts a fresh random stream, no seed continues the one there is;
+    /// no options are those of the configuration. A failed reset changes nothing.
     ///
     /// # Errors
     /// If the first reset has no seed, or an option is wrong.
@@ -111,18 +142,14 @@ impl Session {
         seed: Option<&Seed>,
         options: Option<&Map<String, Value>>,
     ) -> Result<Observation, EnvError> {
-        let spec = self.spec;
-        let none = Map::new();
-        let options = options.unwrap_or(&none);
-        if let Some(key) = options.keys().find(|key| !spec.reset_options.contains(&key.as_str())) {
-            return Err(EnvError::unknown_key(spec.id, "reset options", key, spec.reset_options));
-        }
+        let options = options.unwrap_or(&self.reset_options);
         let mut rng = match (seed, &self.rng) {
             (Some(seed), _) => NumpyRng::from_seed(seed),
             (None, Some(rng)) => rng.clone(),
             (None, None) => return Err(EnvError::about("seed", "the first reset needs a seed")),
         };
-        let obs = self.env.dynamic_mut().reset(options, &mut rng)?;
+        self.spec.set_reset_options(&mut self.env, options)?;
+        let obs = self.env.dynamic_mut().reset(&mut rng);
         self.rng = Some(rng);
         self.elapsed = Some(0);
         Ok(obs)
@@ -132,25 +159,27 @@ impl Session {
     ///
     /// # Errors
     /// Before the first reset, and if there is no such action.
-    pub fn step(&mut self, action: i64) -> Result<SessionStep, EnvError> {
+    pub fn step(&mut self, action: &PlayedAction) -> Result<SessionStep, EnvError> {
         let (Some(rng), Some(elapsed)) = (&mut self.rng, &mut self.elapsed) else {
-            return Err(EnvError::new(
-                "an episode starts with a reset: there was no reset before \
-                                      this step",
-            ));
+            let message = "an episode starts with a reset: there was no reset before this step";
+            return Err(EnvError::new(message));
         };
-        let actions = self.schema.actions;
-        let index = usize::try_from(action).ok().filter(|&a| a < self.env.n_actions());
-        let Some(index) = index else {
-            let names: Vec<_> =
-                actions.iter().enumerate().map(|(i, name)| format!("{i} ({name})")).collect();
-            let id = self.spec.id;
-            return Err(EnvError::new(format!(
-                "{id} has no action {action}: its actions are {}",
-                names.join(", ")
-            )));
+        let step = match (self.env.action_space(), action) {
+            (ActionSpace::Discrete(n), &PlayedAction::Index(index)) => {
+                let Some(index) = usize::try_from(index).ok().filter(|&a| a < n) else {
+                    let names = self.schema.actions.iter().enumerate();
+                    let names: Vec<_> = names.map(|(i, name)| format!("{i} ({name})")).collect();
+                    let (id, names) = (self.spec.id, names.join(", "));
+                    let message = format!("{id} has no action {index}: its actions are {names}");
+                    return Err(EnvError::new(message));
+                };
+                self.env.dynamic_mut().step(index, rng)
+            }
+            (space, action) => {
+                let action = checked_box(self.spec.id, &space, action)?;
+                self.env.dynamic_mut().step_box(&action, rng)
+            }
         };
-        let step = self.env.dynamic_mut().step(index, rng);
         *elapsed = elapsed.saturating_add(1);
         Ok(SessionStep {
             obs: step.obs,
@@ -200,17 +229,17 @@ mod tests {
     #[test]
     fn order_and_actions_are_checked() {
         let mut cart = session("CartPole-v1");
-        let message = cart.step(0).unwrap_err().message;
+        let message = cart.step(&0.into()).unwrap_err().message;
         assert!(message.contains("there was no reset before this step"), "{message}");
         assert_eq!(cart.reset(None, None).unwrap_err().message, "the first reset needs a seed");
         cart.reset(Some(&seed()), None).unwrap();
-        for bad in [2, -1] {
+        for bad in [2i64, -1] {
             assert_eq!(
-                cart.step(bad).unwrap_err().message,
+                cart.step(&bad.into()).unwrap_err().message,
                 format!("CartPole-v1 has no action {bad}: its actions are 0 (left), 1 (right)")
             );
         }
-        cart.step(1).unwrap();
+        cart.step(&1.into()).unwrap();
     }
 
     #[test]
@@ -221,7 +250,7 @@ mod tests {
         let options = |value: Value| value.as_object().unwrap().clone();
         let bad = options(json!({"low": 1}));
         cart.reset(Some(&Seed::from(1)), Some(&bad)).unwrap_err();
-        assert_eq!(cart.step(0).unwrap(), untouched.step(0).unwrap());
+        assert_eq!(cart.step(&0.into()).unwrap(), untouched.step(&0.into()).unwrap());
         assert_eq!(cart.reset(None, None).unwrap(), untouched.reset(None, None).unwrap());
 
         let unknown = options(json!({"lo": 1}));
@@ -235,13 +264,13 @@ mod tests {
     fn the_limit_truncates_and_stays_truncated() {
         let mut car = session("MountainCar-v0").with_max_episode_steps(2).unwrap();
         car.reset(Some(&seed()), None).unwrap();
-        let truncated: Vec<_> = (0..4).map(|_| car.step(1).unwrap().truncated).collect();
+        let truncated: Vec<_> = (0..4).map(|_| car.step(&1.into()).unwrap().truncated).collect();
         assert_eq!(truncated, [false, true, true, true]);
         car.reset(None, None).unwrap();
-        assert!(!car.step(1).unwrap().truncated);
+        assert!(!car.step(&1.into()).unwrap().truncated);
         let mut endless = session("MountainCar-v0").with_max_episode_steps(-1).unwrap();
         endless.reset(Some(&seed()), None).unwrap();
-        assert!((0..1000).all(|_| !endless.step(1).unwrap().truncated));
+        assert!((0..1000).all(|_| !endless.step(&1.into()).unwrap().truncated));
         for bad in [0, -5, 1 << 32] {
             let error = session("MountainCar-v0").with_max_episode_steps(bad).unwrap_err();
             assert_eq!(error.key.as_deref(), Some("max_episode_steps"));
@@ -255,7 +284,7 @@ mod tests {
         let lake = Session::new("FrozenLake-v1", kwargs.as_object().unwrap()).unwrap();
         let mut lake = lake.with_max_episode_steps(1).unwrap();
         lake.reset(Some(&seed()), None).unwrap();
-        let step = lake.step(2).unwrap();
+        let step = lake.step(&2.into()).unwrap();
         assert!(step.terminated && step.truncated);
         assert_eq!(step.probability, Some(1.0));
     }

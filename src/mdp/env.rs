@@ -28,6 +28,20 @@ impl Ending {
     }
 }
 
+/// What actions an environment takes: Gymnasium's `action_space`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ActionSpace {
+    /// `Discrete(n)`: `0..n`.
+    Discrete(usize),
+    /// `Box(low, high, float32)`: a list of real numbers, with the bounds of each.
+    Box {
+        /// The least value of each component; what is below is clipped.
+        low: &'static [f32],
+        /// The greatest value of each component; what is above is clipped.
+        high: &'static [f32],
+    },
+}
+
 /// What one action brought.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step<O> {
@@ -48,14 +62,29 @@ pub trait Env: Send {
     /// An observation: an array of float32 as Gymnasium returns it, or a state index.
     type Obs: Copy + Send + Sync + std::fmt::Debug + 'static;
 
-    /// Number of discrete actions; valid ones are `0..n_actions`.
+    /// Number of actions that an agent chooses among; valid ones are `0..n_actions`. Where actions
+    /// are real numbers, each stands for an entry of a table.
     fn n_actions(&self) -> usize;
+
+    /// What actions Gymnasium's environment takes.
+    fn action_space(&self) -> ActionSpace {
+        ActionSpace::Discrete(self.n_actions())
+    }
 
     /// Starts an episode and returns its first observation.
     fn reset(&mut self, rng: &mut NumpyRng) -> Self::Obs;
 
     /// Plays `action` (below [`Self::n_actions`]; the caller has checked).
     fn step(&mut self, action: Action, rng: &mut NumpyRng) -> Step<Self::Obs>;
+
+    /// Plays a real-valued action: one finite number per component of the `Box` that
+    /// [`Self::action_space`] is (the caller has checked).
+    ///
+    /// # Panics
+    /// If the action space is discrete.
+    fn step_box(&mut self, _action: &[f32], _rng: &mut NumpyRng) -> Step<Self::Obs> {
+        unreachable!("the actions of this environment are integers")
+    }
 
     /// The model, for environments that step a [`FiniteMdp`].
     fn finite(&self) -> Option<&Arc<FiniteMdp>> {
@@ -120,7 +149,7 @@ pub struct Schema {
     /// Facts about this instance, readable as `s.name` too: `rows`, `goal_col`, ….
     pub facts: Vec<(&'static str, FieldKind, f64)>,
     /// What each action is called, in order: `["left", "down", "right", "up"]`.
-    pub actions: &'static [&'static str],
+    pub actions: Vec<String>,
     /// The map, if the environment is a grid world whose state index is `row * cols + col`.
     pub grid: Option<Grid>,
 }

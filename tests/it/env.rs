@@ -112,7 +112,7 @@ proptest! {
             session.reset(Some(&Seed::from(seed)), None).unwrap();
             let mut played = 0;
             for action in actions.iter().map(|&a| usize::from(a) % n) {
-                let step = session.step(action as i64).unwrap();
+                let step = session.step(&session.action(action)).unwrap();
                 played += 1;
                 let limit = spec.max_steps.is_some_and(|limit| played >= limit);
                 prop_assert_eq!(step.truncated, limit, "{} after {} steps", spec.id, played);

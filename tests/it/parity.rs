@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
 use runner::env::recording::{ParityReport, Tolerance, replay, replay_file, tolerance};
-use runner::env::{EnvSpec, find, make, specs};
-use runner::mdp::{Outcome, Schema};
-use serde_json::{Map, Value};
+use runner::env::{make, specs};
+use runner::mdp::{ActionSpace, Outcome, Schema};
+use serde_json::{Map, Value, json};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/gymnasium")
@@ -28,18 +28,18 @@ fn reports() -> Vec<ParityReport> {
 
 #[test]
 fn recordings_replay_bit_for_bit() {
-    let reports = reports();
-    assert_eq!(reports.len(), 20);
-    assert_eq!(reports.iter().map(|report| report.steps).sum::<u64>(), 14_849);
+    // Where the C library's functions are not the correctly rounded ones, and it shows: the file,
+    // and how many of its numbers differ.
+    let inexact = [("acrobot_pump", 192), ("pendulum_pd", 2)];
     let mut failed = String::new();
-    for report in &reports {
-        if !report.is_exact() {
+    for report in &reports() {
+        let known = inexact.iter().find(|(config, _)| *config == report.config);
+        let expected = known.map_or(0, |(_, mismatches)| *mismatches);
+        if report.mismatches != expected || !report.is_within_tolerance() {
             writeln!(failed, "{report:#?}").unwrap();
         }
     }
-    // The tolerance would admit less; nothing of it is needed.
     assert!(failed.is_empty(), "{failed}");
-    assert!(reports.iter().all(ParityReport::is_within_tolerance));
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn every_registered_id_has_a_recording() {
 }
 
 #[test]
-fn the_tolerance_is_exact_but_for_long_cart_pole_episodes() {
+fn the_tolerance_is_exact_but_where_sines_are_amplified() {
     for id in ["FrozenLake-v1", "MountainCar-v0"] {
         assert_eq!(tolerance(id, 500), Tolerance::Exact);
     }
@@ -59,6 +59,8 @@ fn the_tolerance_is_exact_but_for_long_cart_pole_episodes() {
     assert_eq!([cart(0), cart(100)], [Tolerance::Exact; 2]);
     assert_eq!([cart(101), cart(300)], [Tolerance::Within(1e-6); 2]);
     assert_eq!(cart(301), Tolerance::Unchecked);
+    assert_eq!(tolerance("Acrobot-v1", 150), Tolerance::Within(1e-6));
+    assert_eq!(tolerance("Pendulum-v1", 80), Tolerance::Within(1e-9));
 }
 
 /// Gymnasium's `(prob, next_state, reward, terminated)`.
@@ -222,13 +224,18 @@ fn frozen_lake_tables_are_gymnasiums() {
 fn limits_thresholds_and_spaces_are_gymnasiums() {
     let text = std::fs::read_to_string(folder().join("registry.json")).unwrap();
     let registry: Vec<Value> = serde_json::from_str(&text).unwrap();
-    assert_eq!(registry.len(), specs().len());
-    for theirs in registry {
-        let spec: &EnvSpec = find(theirs["id"].as_str().unwrap()).unwrap();
+    for spec in specs() {
+        let theirs = registry.iter().find(|theirs| theirs["id"] == spec.id).unwrap();
         assert_eq!(spec.max_steps.map(u64::from), theirs["max_episode_steps"].as_u64());
         assert_eq!(spec.reward_threshold, theirs["reward_threshold"].as_f64());
         let env = spec.make(&Map::new()).unwrap();
-        assert_eq!(theirs["action_space"], format!("Discrete({})", env.n_actions()));
+        let actions = match env.action_space() {
+            ActionSpace::Discrete(n) => Value::from(format!("Discrete({n})")),
+            ActionSpace::Box { low, high } => {
+                json!({"type": "Box", "low": low, "high": high, "dtype": "float32"})
+            }
+        };
+        assert_eq!(theirs["action_space"], actions);
         match &theirs["observation_space"] {
             Value::String(discrete) => {
                 let states = env.finite().unwrap().n_states();

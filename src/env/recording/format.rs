@@ -4,7 +4,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::RecordingError;
-use crate::env::{Observation, Session};
+use crate::env::{Observation, PlayedAction, Session};
 use crate::mdp::numpy::Seed;
 
 /// Line 1. Fields that a replay does not need are ignored.
@@ -111,7 +111,7 @@ enum RecordedSeed {
 /// One step, as recorded.
 #[derive(Deserialize)]
 pub(super) struct RecordedStep {
-    pub(super) action: i64,
+    pub(super) action: PlayedAction,
     pub(super) obs: RecordedObs,
     pub(super) reward: f64,
     pub(super) terminated: bool,

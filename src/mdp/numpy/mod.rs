@@ -2,6 +2,7 @@
 //!
 //! - [`NumpyRng`]: PCG64 XSL-RR 128/64 (O'Neill 2014) with the buffered 32-bit half, and the draws
 //!   of `Generator` that environments and action spaces use
+//! - [`sin_cos_f32`]: NumPy's float32 sine and cosine
 //! - [`Seed`], [`SeedError`]: a non-negative integer of any size, spread by `SeedSequence`
 //!
 //! No environment draws from a normal or exponential distribution, shuffles or permutes, so those
@@ -10,10 +11,12 @@
 mod seed;
 #[cfg(test)]
 mod tests;
+mod trig;
 
 use serde::{Deserialize, Serialize};
 
 pub use seed::{Seed, SeedError};
+pub use trig::sin_cos_f32;
 
 const MULTIPLIER: u128 = 0x2360_ed05_1fc6_5da4_4385_df64_9fcc_f645;
 

@@ -1,0 +1,122 @@
+//! [`AnyEnv`]'s methods: the environment behind a vtable, for everything that is not a step of a
+//! training loop.
+
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
+use super::actions::ActionTable;
+use super::error::EnvError;
+use super::registered::{Observation, Registered};
+use super::registry::AnyEnv;
+use crate::mdp::numpy::NumpyRng;
+use crate::mdp::{ActionSpace, Env, FiniteMdp, Schema, Step};
+
+/// An environment, seen through a vtable: for sessions, which are dynamic in every step.
+pub(super) trait Dynamic {
+    fn reset(&mut self, rng: &mut NumpyRng) -> Observation;
+    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
+    fn step_box(&mut self, action: &[f32], rng: &mut NumpyRng) -> DynamicStep;
+    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
+    fn set_reset_options(&mut self, options: &Map<String, Value>) -> Result<(), EnvError>;
+    fn action_table(&self) -> Option<&ActionTable>;
+    fn set_action_table(&mut self, table: ActionTable);
+    fn n_actions(&self) -> usize;
+    fn action_space(&self) -> ActionSpace;
+    fn schema(&self) -> Schema;
+    fn finite(&self) -> Option<&Arc<FiniteMdp>>;
+}
+
+/// What [`Dynamic::step`] returns.
+pub(super) struct DynamicStep {
+    pub(super) obs: Observation,
+    pub(super) reward: f64,
+    pub(super) terminated: bool,
+    /// The probability of the outcome, on finite environments.
+    pub(super) probability: Option<f64>,
+}
+
+impl DynamicStep {
+    fn new<E: Registered>(env: &E, step: Step<E::Obs>) -> Self {
+        let probability = Env::finite(env)
+            .zip(env.outcome_index(&step.obs))
+            .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
+        let (reward, terminated) = (step.reward, step.terminated);
+        Self { obs: step.obs.into(), reward, terminated, probability }
+    }
+}
+
+impl<E: Registered> Dynamic for E {
+    fn reset(&mut self, rng: &mut NumpyRng) -> Observation {
+        Env::reset(self, rng).into()
+    }
+
+    fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
+        let step = Env::step(self, action, rng);
+        DynamicStep::new(self, step)
+    }
+
+    fn step_box(&mut self, action: &[f32], rng: &mut NumpyRng) -> DynamicStep {
+        let step = Env::step_box(self, action, rng);
+        DynamicStep::new(self, step)
+    }
+
+    fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError> {
+        Registered::set_attribute(self, name, value)
+    }
+
+    fn set_reset_options(&mut self, options: &Map<String, Value>) -> Result<(), EnvError> {
+        Registered::set_reset_options(self, options)
+    }
+
+    fn action_table(&self) -> Option<&ActionTable> {
+        Registered::action_table(self)
+    }
+
+    fn set_action_table(&mut self, table: ActionTable) {
+        Registered::set_action_table(self, table);
+    }
+
+    fn action_space(&self) -> ActionSpace {
+        Env::action_space(self)
+    }
+
+    fn n_actions(&self) -> usize {
+        Env::n_actions(self)
+    }
+
+    fn schema(&self) -> Schema {
+        Env::schema(self)
+    }
+
+    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
+        Env::finite(self)
+    }
+}
+
+impl AnyEnv {
+    /// Number of actions that an agent chooses among.
+    pub fn n_actions(&self) -> usize {
+        self.dynamic().n_actions()
+    }
+
+    /// What actions Gymnasium's environment takes.
+    pub fn action_space(&self) -> ActionSpace {
+        self.dynamic().action_space()
+    }
+
+    /// Where actions are real numbers: the ones that agents choose among.
+    pub fn action_table(&self) -> Option<&ActionTable> {
+        self.dynamic().action_table()
+    }
+
+    /// How scripts name its states.
+    pub fn schema(&self) -> Schema {
+        self.dynamic().schema()
+    }
+
+    /// Its model, if it has a finite one.
+    pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
+        self.dynamic().finite()
+    }
+}
