@@ -3,7 +3,7 @@
 //! - [`registry`]: [`specs`], [`find`], [`make`]: from an id and arguments to an [`AnyEnv`], and by
 //!   an [`EnvVisitor`] to static dispatch
 //! - [`cart_pole`], [`mountain_car`], [`mountain_car_continuous`], [`acrobot`], [`pendulum`],
-//!   [`frozen_lake`]: the dynamics, documented under Gymnasium's
+//!   [`lunar_lander`], [`frozen_lake`]: the dynamics, documented under Gymnasium's
 //!   headings
 //! - [`Registered`]: what an environment provides beyond its dynamics; [`KwargSpec`], [`Kwargs`]:
 //!   its constructor's arguments; [`EnvError`]: what can be wrong with them
@@ -22,6 +22,7 @@ mod config;
 mod error;
 pub mod frozen_lake;
 mod kwargs;
+pub mod lunar_lander;
 pub mod mountain_car;
 pub mod mountain_car_continuous;
 pub mod pendulum;

@@ -11,21 +11,21 @@ const LOOK_AHEAD: f32 = 2.0;
 
 /// An axis-parallel box.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bounds {
-    pub(super) low: Vec2,
-    pub(super) high: Vec2,
+pub(crate) struct Bounds {
+    pub(crate) low: Vec2,
+    pub(crate) high: Vec2,
 }
 
 impl Bounds {
     /// The box between two corners, with a margin around it.
     #[inline]
-    pub(super) fn around(low: Vec2, high: Vec2, margin: f32) -> Self {
+    pub(crate) fn around(low: Vec2, high: Vec2, margin: f32) -> Self {
         let margin = vec2(margin, margin);
         Self { low: low - margin, high: high + margin }
     }
 
     #[inline]
-    pub(super) fn overlaps(&self, other: &Self) -> bool {
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
         let (right, left) = (other.low - self.high, self.low - other.high);
         !(right.x > 0.0 || right.y > 0.0 || left.x > 0.0 || left.y > 0.0)
     }
@@ -41,37 +41,37 @@ impl Bounds {
 
 /// A velocity and an angular velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Motion {
+pub(crate) struct Motion {
     /// Of the centre of mass, m/s.
-    pub(super) v: Vec2,
+    pub(crate) v: Vec2,
     /// rad/s.
-    pub(super) w: f32,
+    pub(crate) w: f32,
 }
 
 /// A dynamic body with one polygon.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::env::lunar_lander) struct Body {
-    pub(in crate::env::lunar_lander) shape: Polygon,
-    pub(in crate::env::lunar_lander) frame: Transform,
-    pub(super) sweep: Sweep,
-    pub(super) motion: Motion,
+pub(crate) struct Body {
+    pub(crate) shape: Polygon,
+    pub(crate) frame: Transform,
+    pub(crate) sweep: Sweep,
+    pub(crate) motion: Motion,
     /// Gathered until the next step, N and N·m.
     force: Vec2,
     torque: f32,
-    pub(super) inverse_mass: f32,
-    pub(super) inverse_inertia: f32,
-    pub(super) friction: f32,
-    pub(super) awake: bool,
+    pub(crate) inverse_mass: f32,
+    pub(crate) inverse_inertia: f32,
+    pub(crate) friction: f32,
+    pub(crate) awake: bool,
     /// Seconds at rest.
-    pub(super) rested: f32,
+    pub(crate) rested: f32,
     /// Its shape's box with a margin: what decides whether a contact is looked at.
-    pub(super) bounds: Bounds,
+    pub(crate) bounds: Bounds,
     /// Whether the box has changed since contacts were last looked for.
-    pub(super) moved: bool,
+    pub(crate) moved: bool,
 }
 
 impl Body {
-    pub(super) fn new(
+    pub(crate) fn new(
         shape: Polygon,
         density: f32,
         friction: f32,
@@ -112,35 +112,35 @@ impl Body {
     }
 
     #[inline]
-    pub(in crate::env::lunar_lander) fn angle(&self) -> f32 {
+    pub(crate) fn angle(&self) -> f32 {
         self.sweep.angle
     }
 
     /// Of the centre of mass, m/s.
     #[inline]
-    pub(in crate::env::lunar_lander) fn velocity(&self) -> Vec2 {
+    pub(crate) fn velocity(&self) -> Vec2 {
         self.motion.v
     }
 
     /// rad/s.
     #[inline]
-    pub(in crate::env::lunar_lander) fn angular_velocity(&self) -> f32 {
+    pub(crate) fn angular_velocity(&self) -> f32 {
         self.motion.w
     }
 
     #[inline]
-    pub(in crate::env::lunar_lander) fn is_awake(&self) -> bool {
+    pub(crate) fn is_awake(&self) -> bool {
         self.awake
     }
 
-    pub(super) fn wake(&mut self) {
+    pub(crate) fn wake(&mut self) {
         if !self.awake {
             self.awake = true;
             self.rested = 0.0;
         }
     }
 
-    pub(super) fn sleep(&mut self) {
+    pub(crate) fn sleep(&mut self) {
         self.awake = false;
         self.rested = 0.0;
         self.motion = Motion::default();
@@ -148,33 +148,33 @@ impl Body {
     }
 
     /// Pushes at the centre of mass for the next step, N.
-    pub(in crate::env::lunar_lander) fn apply_force(&mut self, force: Vec2) {
+    pub(crate) fn apply_force(&mut self, force: Vec2) {
         self.wake();
         self.force += force;
     }
 
     /// Turns for the next step, N·m.
-    pub(in crate::env::lunar_lander) fn apply_torque(&mut self, torque: f32) {
+    pub(crate) fn apply_torque(&mut self, torque: f32) {
         self.wake();
         self.torque += torque;
     }
 
     /// Kicks at a point of the world, N·s.
-    pub(in crate::env::lunar_lander) fn apply_impulse(&mut self, impulse: Vec2, point: Vec2) {
+    pub(crate) fn apply_impulse(&mut self, impulse: Vec2, point: Vec2) {
         self.wake();
         self.motion.v += self.inverse_mass * impulse;
         self.motion.w += self.inverse_inertia * (point - self.sweep.center).cross(impulse);
     }
 
     #[inline]
-    pub(super) fn clear_forces(&mut self) {
+    pub(crate) fn clear_forces(&mut self) {
         self.force = Vec2::ZERO;
         self.torque = 0.0;
     }
 
     /// Its motion after `dt` of the forces on it.
     #[inline]
-    pub(super) fn accelerated(&self, gravity: Vec2, dt: f32) -> Motion {
+    pub(crate) fn accelerated(&self, gravity: Vec2, dt: f32) -> Motion {
         Motion {
             v: self.motion.v + dt * (gravity + self.inverse_mass * self.force),
             w: self.motion.w + dt * self.inverse_inertia * self.torque,
@@ -183,7 +183,7 @@ impl Body {
 
     /// Puts it where `place` says.
     #[inline]
-    pub(super) fn put(&mut self, place: Place, motion: Motion) {
+    pub(crate) fn put(&mut self, place: Place, motion: Motion) {
         self.sweep.center = place.center;
         self.sweep.angle = place.angle;
         self.motion = motion;
@@ -191,13 +191,13 @@ impl Body {
     }
 
     #[inline]
-    pub(super) fn update_frame(&mut self) {
+    pub(crate) fn update_frame(&mut self) {
         let Sweep { center, angle, local_center, .. } = self.sweep;
         self.frame = Transform::about_center(center, angle, local_center);
     }
 
     /// Moves it to where its sweep is at the fraction `time` of the step.
-    pub(super) fn advance(&mut self, time: f32) {
+    pub(crate) fn advance(&mut self, time: f32) {
         self.sweep.advance(time);
         self.sweep.center = self.sweep.center0;
         self.sweep.angle = self.sweep.angle0;
@@ -205,7 +205,7 @@ impl Body {
     }
 
     /// Adapts the box to the movement of this step.
-    pub(super) fn update_bounds(&mut self) {
+    pub(crate) fn update_bounds(&mut self) {
         let Sweep { center0, angle0, local_center, .. } = self.sweep;
         let before = Transform::about_center(center0, angle0, local_center);
         let (low0, high0) = self.shape.bounds(before);
@@ -227,22 +227,22 @@ impl Body {
 
     /// The place it has now.
     #[inline]
-    pub(super) fn place(&self) -> Place {
+    pub(crate) fn place(&self) -> Place {
         Place { center: self.sweep.center, angle: self.sweep.angle }
     }
 }
 
 /// Where a body is: its centre of mass and its angle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Place {
-    pub(super) center: Vec2,
-    pub(super) angle: f32,
+pub(crate) struct Place {
+    pub(crate) center: Vec2,
+    pub(crate) angle: f32,
 }
 
 impl Place {
     /// The place after `dt`, and the motion, slowed down if it is too fast for one step.
     #[inline]
-    pub(super) fn after(self, mut motion: Motion, dt: f32) -> (Self, Motion) {
+    pub(crate) fn after(self, mut motion: Motion, dt: f32) -> (Self, Motion) {
         let translation = dt * motion.v;
         if translation.length_squared() > MAX_TRANSLATION * MAX_TRANSLATION {
             motion.v = (MAX_TRANSLATION / translation.length()) * motion.v;

@@ -4,26 +4,26 @@ use super::manifold::Manifold;
 
 /// A pair whose boxes overlap.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Contact {
+pub(crate) struct Contact {
     /// The edge's index.
-    pub(super) edge: usize,
+    pub(crate) edge: usize,
     /// The body's index.
-    pub(super) body: usize,
-    pub(super) manifold: Manifold,
-    pub(super) touching: bool,
+    pub(crate) body: usize,
+    pub(crate) manifold: Manifold,
+    pub(crate) touching: bool,
     /// Cleared where a sub-step found nothing; such a pair waits for the next full update.
-    pub(super) enabled: bool,
+    pub(crate) enabled: bool,
     /// When the two meet in this step, as a fraction of it, if that is known.
-    pub(super) impact: Option<f32>,
+    pub(crate) impact: Option<f32>,
     /// How many impacts of this step it has had.
-    pub(super) impacts: u32,
+    pub(crate) impacts: u32,
     /// The coefficient of the pair.
-    pub(super) friction: f32,
+    pub(crate) friction: f32,
 }
 
 /// What an update of a contact has changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Change {
+pub(crate) enum Change {
     None,
     Begin,
     End,
@@ -31,7 +31,7 @@ pub(super) enum Change {
 
 impl Contact {
     /// A pair that is not known to touch. Coefficients of friction mix by their geometric mean.
-    pub(super) fn new(edge: usize, body: usize, frictions: (f32, f32)) -> Self {
+    pub(crate) fn new(edge: usize, body: usize, frictions: (f32, f32)) -> Self {
         Self {
             edge,
             body,
@@ -45,7 +45,7 @@ impl Contact {
     }
 
     /// Takes a new manifold, with the impulses of the points that it shares with the old one.
-    pub(super) fn update(&mut self, mut manifold: Manifold) -> Change {
+    pub(crate) fn update(&mut self, mut manifold: Manifold) -> Change {
         manifold.inherit(&self.manifold);
         self.manifold = manifold;
         self.enabled = true;

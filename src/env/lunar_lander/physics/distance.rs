@@ -29,7 +29,7 @@ impl Corner {
 
 /// The simplex of the last query: a good start for the next one nearby.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Cache {
+pub(crate) struct Cache {
     metric: f32,
     /// Pairs of corners: of the edge, of the polygon.
     pairs: [(u8, u8); 3],
@@ -37,7 +37,7 @@ pub(super) struct Cache {
 }
 
 impl Cache {
-    pub(super) fn pairs(&self) -> &[(u8, u8)] {
+    pub(crate) fn pairs(&self) -> &[(u8, u8)] {
         &self.pairs[..self.n]
     }
 }
@@ -186,7 +186,7 @@ impl Simplex {
 
 /// The distance between `edge` and `polygon`, placed by `frame`, without their skins; 0 if they
 /// overlap.
-pub(super) fn distance(
+pub(crate) fn distance(
     edge: &[Vec2; 2],
     polygon: &Polygon,
     frame: Transform,

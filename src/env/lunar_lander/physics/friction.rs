@@ -46,11 +46,11 @@ impl Symmetric {
 
 /// The constants of a contact during the iterations of one step, and its growing impulses.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ContactRow {
+pub(crate) struct ContactRow {
     /// Where the contact stands in the list.
-    pub(super) contact: usize,
+    pub(crate) contact: usize,
     /// The body's index.
-    pub(super) body: usize,
+    pub(crate) body: usize,
     inverse_mass: f32,
     inverse_inertia: f32,
     friction: f32,
@@ -98,7 +98,7 @@ fn world_points(manifold: &Manifold, frame: Transform) -> (Vec2, [Vec2; 2]) {
 impl ContactRow {
     /// Prepares a contact that touches; `warm` scales the last step's impulses, if they are to be
     /// started with.
-    pub(super) fn new(
+    pub(crate) fn new(
         index: usize,
         contact: &Contact,
         body: &Body,
@@ -151,7 +151,7 @@ impl ContactRow {
     }
 
     /// Applies the impulses it starts with.
-    pub(super) fn warm_start(&self, motion: &mut Motion) {
+    pub(crate) fn warm_start(&self, motion: &mut Motion) {
         for point in &self.points[..self.n] {
             let impulse =
                 point.normal_impulse * self.normal + point.tangent_impulse * self.tangent;
@@ -161,7 +161,7 @@ impl ContactRow {
     }
 
     /// Keeps the impulses for the next step.
-    pub(super) fn finish(&self, contact: &mut Contact) {
+    pub(crate) fn finish(&self, contact: &mut Contact) {
         for (point, row) in contact.manifold.points.iter_mut().zip(&self.points[..self.n]) {
             point.normal_impulse = row.normal_impulse;
             point.tangent_impulse = row.tangent_impulse;
@@ -170,7 +170,7 @@ impl ContactRow {
 
     /// One iteration: friction first, because not sinking in is more important.
     #[inline]
-    pub(super) fn solve(&mut self, motion: &mut Motion) {
+    pub(crate) fn solve(&mut self, motion: &mut Motion) {
         let (m, i) = (self.inverse_mass, self.inverse_inertia);
         for point in &mut self.points[..self.n] {
             let slip = (motion.v + point.arm.spun(motion.w)).dot(self.tangent);
@@ -233,7 +233,7 @@ impl ContactRow {
 
 /// Moves `place` out of the ground by the share `rate` of the overlap; returns the separation of
 /// the deepest point, or 0.
-pub(super) fn correct(contact: &Contact, body: &Body, place: &mut Place, rate: f32) -> f32 {
+pub(crate) fn correct(contact: &Contact, body: &Body, place: &mut Place, rate: f32) -> f32 {
     let manifold = &contact.manifold;
     let (m, i) = (body.inverse_mass, body.inverse_inertia);
     let mut deepest = 0.0;

@@ -6,7 +6,7 @@ use super::{ANGULAR_SLOP, LINEAR_SLOP, MAX_ANGULAR_CORRECTION};
 
 /// Which limit of a hinge is active.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Limit {
+pub(crate) enum Limit {
     Inactive,
     Lower,
     Upper,
@@ -26,25 +26,25 @@ struct Impulse {
 /// A pin through a point of the hull and one of a leg, with a motor that turns the leg against
 /// the hull, between two angles.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::env::lunar_lander) struct Hinge {
+pub(crate) struct Hinge {
     /// The pin in the frames of the hull and of the leg.
-    pub(super) hull_anchor: Vec2,
-    pub(super) leg_anchor: Vec2,
+    pub(crate) hull_anchor: Vec2,
+    pub(crate) leg_anchor: Vec2,
     /// The leg's angle less the hull's at which the hinge's angle is 0.
-    pub(super) reference_angle: f32,
-    pub(super) lower: f32,
-    pub(super) upper: f32,
+    pub(crate) reference_angle: f32,
+    pub(crate) lower: f32,
+    pub(crate) upper: f32,
     /// What the motor wants, rad/s.
-    pub(super) motor_speed: f32,
+    pub(crate) motor_speed: f32,
     /// The most it can do, N·m.
-    pub(super) max_torque: f32,
+    pub(crate) max_torque: f32,
     impulse: Impulse,
     limit: Limit,
 }
 
 /// The constants of a hinge during the iterations of one step, and its growing impulse.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct HingeRow {
+pub(crate) struct HingeRow {
     hull_arm: Vec2,
     leg_arm: Vec2,
     hull_mass: f32,
@@ -64,12 +64,12 @@ pub(super) struct HingeRow {
     minus_inverse3: f32,
     /// The same of the upper left block.
     minus_inverse2: f32,
-    pub(super) limit: Limit,
+    pub(crate) limit: Limit,
     impulse: Impulse,
 }
 
 impl Hinge {
-    pub(super) fn new(anchors: [Vec2; 2], limits: [f32; 2], motor: [f32; 2], at: f32) -> Self {
+    pub(crate) fn new(anchors: [Vec2; 2], limits: [f32; 2], motor: [f32; 2], at: f32) -> Self {
         Self {
             hull_anchor: anchors[0],
             leg_anchor: anchors[1],
@@ -100,7 +100,7 @@ impl Hinge {
 
     /// Prepares a step of `dt`, and applies the last one's impulses, scaled to this one.
     #[allow(clippy::too_many_arguments)]
-    pub(super) fn start(
+    pub(crate) fn start(
         &mut self,
         (hull, hull_at, hull_motion): (&Body, Place, &mut Motion),
         (leg, leg_at, leg_motion): (&Body, Place, &mut Motion),
@@ -151,13 +151,13 @@ impl Hinge {
     }
 
     /// Keeps the impulse for the next step.
-    pub(super) fn finish(&mut self, row: &HingeRow) {
+    pub(crate) fn finish(&mut self, row: &HingeRow) {
         self.impulse = row.impulse;
     }
 
     /// Moves both bodies towards where the hinge wants them; whether they were close enough
     /// already.
-    pub(super) fn correct(&self, (hull, a): (&Body, &mut Place), (leg, b): (&Body, &mut Place)) -> bool {
+    pub(crate) fn correct(&self, (hull, a): (&Body, &mut Place), (leg, b): (&Body, &mut Place)) -> bool {
         let (ia, ib) = (hull.inverse_inertia, leg.inverse_inertia);
         let (ma, mb) = (hull.inverse_mass, leg.inverse_mass);
         let mut angular_error = 0.0;
@@ -196,7 +196,7 @@ impl Hinge {
 impl HingeRow {
     /// One iteration: the motor, then the pin, together with the limit if one is active.
     #[inline(always)]
-    pub(super) fn solve(&mut self, hull: &mut Motion, leg: &mut Motion) {
+    pub(crate) fn solve(&mut self, hull: &mut Motion, leg: &mut Motion) {
         self.drive(hull, leg);
         // The point of the leg at the pin, as seen from the hull's.
         let slip =

@@ -121,7 +121,7 @@ impl Approach<'_> {
 
 /// When `polygon`, moving along `sweep`, first comes close to `edge`, as a fraction of the rest of
 /// the step; `None` if it does not, or is too close already.
-pub(super) fn time_of_impact(edge: &[Vec2; 2], polygon: &Polygon, sweep: &Sweep) -> Option<f32> {
+pub(crate) fn time_of_impact(edge: &[Vec2; 2], polygon: &Polygon, sweep: &Sweep) -> Option<f32> {
     let approach = Approach { edge, polygon, sweep: sweep.unwound() };
     let mut cache = Cache::default();
     let mut now = 0.0;

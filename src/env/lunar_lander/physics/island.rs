@@ -46,7 +46,7 @@ impl World {
     }
 
     /// Moves everything by `dt`, if anything is awake; `dt_ratio` is `dt` over the last one.
-    pub(super) fn solve(&mut self, dt: f32, dt_ratio: f32) {
+    pub(crate) fn solve(&mut self, dt: f32, dt_ratio: f32) {
         let Some(order) = self.order() else { return };
         let mut places = [Place::default(); 3];
         let mut motions = [Motion::default(); 3];
@@ -170,7 +170,7 @@ impl World {
     }
 
     /// Moves one body by `dt` from where it met the ground; `first` is the contact that did.
-    pub(super) fn solve_sub_step(&mut self, body: usize, first: usize, dt: f32) {
+    pub(crate) fn solve_sub_step(&mut self, body: usize, first: usize, dt: f32) {
         let mut rows = std::mem::take(&mut self.rows);
         let others = (0..self.contacts.len()).rev().filter(|&i| {
             i != first && self.contacts[i].body == body && self.contacts[i].touching

@@ -11,14 +11,14 @@ const REACH: f32 = 2.0 * SKIN;
 
 /// A segment of the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::env::lunar_lander) struct Edge {
-    pub(in crate::env::lunar_lander) from: Vec2,
-    pub(in crate::env::lunar_lander) to: Vec2,
+pub(crate) struct Edge {
+    pub(crate) from: Vec2,
+    pub(crate) to: Vec2,
 }
 
 /// Whose side is the flat one that the other's corners touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Reference {
+pub(crate) enum Reference {
     Edge,
     Polygon,
 }
@@ -35,7 +35,7 @@ pub(super) enum Reference {
 ///
 /// The names are not unique: two different points may go by the same one, and then share impulses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Feature {
+pub(crate) struct Feature {
     first: u8,
     second: u8,
     cut: bool,
@@ -43,14 +43,14 @@ pub(super) struct Feature {
 
 /// One of up to two points of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ManifoldPoint {
+pub(crate) struct ManifoldPoint {
     /// A corner, in the frame of the shape that is not the reference.
-    pub(super) local: Vec2,
-    pub(super) feature: Feature,
+    pub(crate) local: Vec2,
+    pub(crate) feature: Feature,
     /// N·s, of the last step.
-    pub(super) normal_impulse: f32,
+    pub(crate) normal_impulse: f32,
     /// N·s, of the last step.
-    pub(super) tangent_impulse: f32,
+    pub(crate) tangent_impulse: f32,
 }
 
 impl ManifoldPoint {
@@ -61,20 +61,20 @@ impl ManifoldPoint {
 
 /// How a polygon and an edge touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Manifold {
-    pub(super) reference: Reference,
+pub(crate) struct Manifold {
+    pub(crate) reference: Reference,
     /// Of the reference's side, in the reference's frame.
-    pub(super) normal: Vec2,
+    pub(crate) normal: Vec2,
     /// A point of the reference's side, in the reference's frame.
-    pub(super) point: Vec2,
-    pub(super) points: [ManifoldPoint; 2],
+    pub(crate) point: Vec2,
+    pub(crate) points: [ManifoldPoint; 2],
     /// How many of the points there are.
-    pub(super) n: usize,
+    pub(crate) n: usize,
 }
 
 impl Manifold {
     /// No contact.
-    pub(super) const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         reference: Reference::Edge,
         normal: Vec2::ZERO,
         point: Vec2::ZERO,
@@ -86,12 +86,12 @@ impl Manifold {
     };
 
     #[inline]
-    pub(super) fn points(&self) -> &[ManifoldPoint] {
+    pub(crate) fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.n]
     }
 
     /// Takes over the impulses of the points that were there before.
-    pub(super) fn inherit(&mut self, old: &Self) {
+    pub(crate) fn inherit(&mut self, old: &Self) {
         for point in &mut self.points[..self.n] {
             if let Some(before) = old.points().iter().find(|p| p.feature == point.feature) {
                 point.normal_impulse = before.normal_impulse;
@@ -116,7 +116,7 @@ struct Side {
 }
 
 /// How `polygon`, placed by `frame`, touches `edge`.
-pub(super) fn collide(edge: &Edge, polygon: &Polygon, frame: Transform) -> Manifold {
+pub(crate) fn collide(edge: &Edge, polygon: &Polygon, frame: Transform) -> Manifold {
     let Edge { from, to } = *edge;
     let below = (to - from).normalized().0.right();
     // An edge has two sides; the one that counts is where the polygon's centroid is.

@@ -29,12 +29,12 @@ mod polygon;
 mod vector;
 mod world;
 
-pub(super) use body::Body;
-pub(super) use hinge::Hinge;
-pub(super) use manifold::Edge;
-pub(super) use polygon::Polygon;
-pub(super) use vector::{Vec2, vec2};
-pub(super) use world::{EDGES, HULL, LEGS, Part, World};
+pub(crate) use body::Body;
+pub(crate) use hinge::Hinge;
+pub(crate) use manifold::Edge;
+pub(crate) use polygon::Polygon;
+pub(crate) use vector::vec2;
+pub(crate) use world::{EDGES, HULL, LEGS, Part, World};
 
 use std::f32::consts::PI;
 

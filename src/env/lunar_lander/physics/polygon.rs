@@ -3,27 +3,27 @@
 use super::vector::{Transform, Vec2, vec2};
 
 /// The most corners a polygon of the lander has.
-pub(super) const MAX_CORNERS: usize = 6;
+pub(crate) const MAX_CORNERS: usize = 6;
 
 /// A convex polygon, counter-clockwise.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::env::lunar_lander) struct Polygon {
+pub(crate) struct Polygon {
     corners: [Vec2; MAX_CORNERS],
     /// `normals[i]` belongs to the side from corner `i` to the next one.
     normals: [Vec2; MAX_CORNERS],
     n: usize,
-    pub(super) centroid: Vec2,
+    pub(crate) centroid: Vec2,
 }
 
 /// What a body's shape makes of its density.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Mass {
+pub(crate) struct Mass {
     /// kg.
-    pub(super) mass: f32,
+    pub(crate) mass: f32,
     /// In the body's frame.
-    pub(super) center: Vec2,
+    pub(crate) center: Vec2,
     /// About the origin of the body's frame, kg·m².
-    pub(super) inertia: f32,
+    pub(crate) inertia: f32,
 }
 
 impl Polygon {
@@ -31,7 +31,7 @@ impl Polygon {
     ///
     /// The hull starts at the right-most point (the lowest of several): the order of the corners
     /// decides ties in collisions, and names contact points.
-    pub(super) fn hull(points: &[Vec2]) -> Self {
+    pub(crate) fn hull(points: &[Vec2]) -> Self {
         assert!((3..=MAX_CORNERS).contains(&points.len()), "a polygon of {} points", points.len());
         let mut first = 0;
         for (i, p) in points.iter().enumerate() {
@@ -75,7 +75,7 @@ impl Polygon {
     }
 
     /// The rectangle of these half extents about the origin.
-    pub(super) fn rectangle(half_width: f32, half_height: f32) -> Self {
+    pub(crate) fn rectangle(half_width: f32, half_height: f32) -> Self {
         let (w, h) = (half_width, half_height);
         let mut corners = [Vec2::ZERO; MAX_CORNERS];
         let mut normals = corners;
@@ -90,18 +90,18 @@ impl Polygon {
     }
 
     #[inline]
-    pub(in crate::env::lunar_lander) fn corners(&self) -> &[Vec2] {
+    pub(crate) fn corners(&self) -> &[Vec2] {
         &self.corners[..self.n]
     }
 
     #[inline]
-    pub(super) fn normals(&self) -> &[Vec2] {
+    pub(crate) fn normals(&self) -> &[Vec2] {
         &self.normals[..self.n]
     }
 
     /// The corner after corner `i`.
     #[inline]
-    pub(super) fn after(&self, i: usize) -> usize {
+    pub(crate) fn after(&self, i: usize) -> usize {
         if i + 1 < self.n { i + 1 } else { 0 }
     }
 
@@ -122,7 +122,7 @@ impl Polygon {
 
     /// Its mass properties at `density` (kg/m²), from the triangles between the sides and the mean
     /// of the corners.
-    pub(super) fn mass(&self, density: f32) -> Mass {
+    pub(crate) fn mass(&self, density: f32) -> Mass {
         let mut middle = Vec2::ZERO;
         for &corner in self.corners() {
             middle += corner;
@@ -149,13 +149,13 @@ impl Polygon {
 
     /// The corner that is farthest in `direction`; the first one of several.
     #[inline]
-    pub(super) fn support(&self, direction: Vec2) -> usize {
+    pub(crate) fn support(&self, direction: Vec2) -> usize {
         support(self.corners(), direction)
     }
 
     /// The smallest box around it, where `frame` puts it.
     #[inline]
-    pub(super) fn bounds(&self, frame: Transform) -> (Vec2, Vec2) {
+    pub(crate) fn bounds(&self, frame: Transform) -> (Vec2, Vec2) {
         let first = frame.apply(self.corners[0]);
         let (mut low, mut high) = (first, first);
         for &corner in &self.corners()[1..] {
@@ -171,7 +171,7 @@ const THIRD: f32 = 1.0 / 3.0;
 
 /// The point that is farthest in `direction`; the first one of several.
 #[inline]
-pub(super) fn support(points: &[Vec2], direction: Vec2) -> usize {
+pub(crate) fn support(points: &[Vec2], direction: Vec2) -> usize {
     let mut best = 0;
     let mut farthest = f32::NEG_INFINITY;
     for (i, point) in points.iter().enumerate() {

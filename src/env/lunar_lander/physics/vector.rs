@@ -6,75 +6,75 @@ use crate::mdp::math::sin_cos_f32;
 
 /// The smaller one; `b` if they are equal, so the sign of a zero is decided too.
 #[inline]
-pub(super) fn min(a: f32, b: f32) -> f32 {
+pub(crate) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// The larger one; `b` if they are equal.
 #[inline]
-pub(super) fn max(a: f32, b: f32) -> f32 {
+pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// `x`, or the limit that it exceeds.
 #[inline]
-pub(super) fn clamp(x: f32, low: f32, high: f32) -> f32 {
+pub(crate) fn clamp(x: f32, low: f32, high: f32) -> f32 {
     max(low, min(x, high))
 }
 
 /// A vector in the plane, in metres (or metres per second, or newton seconds).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(in crate::env::lunar_lander) struct Vec2 {
-    pub(in crate::env::lunar_lander) x: f32,
-    pub(in crate::env::lunar_lander) y: f32,
+pub(crate) struct Vec2 {
+    pub(crate) x: f32,
+    pub(crate) y: f32,
 }
 
 /// The vector (`x`, `y`).
 #[inline]
-pub(in crate::env::lunar_lander) const fn vec2(x: f32, y: f32) -> Vec2 {
+pub(crate) const fn vec2(x: f32, y: f32) -> Vec2 {
     Vec2 { x, y }
 }
 
 impl Vec2 {
-    pub(super) const ZERO: Self = vec2(0.0, 0.0);
+    pub(crate) const ZERO: Self = vec2(0.0, 0.0);
 
     #[inline]
-    pub(super) fn dot(self, other: Self) -> f32 {
+    pub(crate) fn dot(self, other: Self) -> f32 {
         self.x * other.x + self.y * other.y
     }
 
     /// The z component of the cross product.
     #[inline]
-    pub(super) fn cross(self, other: Self) -> f32 {
+    pub(crate) fn cross(self, other: Self) -> f32 {
         self.x * other.y - self.y * other.x
     }
 
     /// Turned right by 90°: from an edge of a counter-clockwise polygon to its outer normal.
     #[inline]
-    pub(super) fn right(self) -> Self {
+    pub(crate) fn right(self) -> Self {
         vec2(self.y, -self.x)
     }
 
     /// The velocity of a point at this place of a body that turns with `omega` about the origin.
     #[inline]
-    pub(super) fn spun(self, omega: f32) -> Self {
+    pub(crate) fn spun(self, omega: f32) -> Self {
         vec2(-omega * self.y, omega * self.x)
     }
 
     #[inline]
-    pub(super) fn length_squared(self) -> f32 {
+    pub(crate) fn length_squared(self) -> f32 {
         self.x * self.x + self.y * self.y
     }
 
     #[inline]
-    pub(super) fn length(self) -> f32 {
+    pub(crate) fn length(self) -> f32 {
         self.length_squared().sqrt()
     }
 
     /// The unit vector in its direction, and its length; a vector too short for that stays as it
     /// is, with length 0.
     #[inline]
-    pub(super) fn normalized(self) -> (Self, f32) {
+    pub(crate) fn normalized(self) -> (Self, f32) {
         let length = self.length();
         if length < f32::EPSILON {
             return (self, 0.0);
@@ -85,13 +85,13 @@ impl Vec2 {
 
     /// The smaller one of each coordinate.
     #[inline]
-    pub(super) fn min(self, other: Self) -> Self {
+    pub(crate) fn min(self, other: Self) -> Self {
         vec2(min(self.x, other.x), min(self.y, other.y))
     }
 
     /// The larger one of each coordinate.
     #[inline]
-    pub(super) fn max(self, other: Self) -> Self {
+    pub(crate) fn max(self, other: Self) -> Self {
         vec2(max(self.x, other.x), max(self.y, other.y))
     }
 }
@@ -148,77 +148,75 @@ impl Mul<Vec2> for f32 {
 
 /// A rotation about the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::env::lunar_lander) struct Rotation {
-    pub(super) sin: f32,
-    pub(super) cos: f32,
+pub(crate) struct Rotation {
+    pub(crate) sin: f32,
+    pub(crate) cos: f32,
 }
 
 impl Rotation {
-    pub(super) const IDENTITY: Self = Self { sin: 0.0, cos: 1.0 };
-
     #[inline]
-    pub(super) fn by(angle: f32) -> Self {
+    pub(crate) fn by(angle: f32) -> Self {
         let (sin, cos) = sin_cos_f32(angle);
         Self { sin, cos }
     }
 
     #[inline]
-    pub(in crate::env::lunar_lander) fn apply(self, v: Vec2) -> Vec2 {
+    pub(crate) fn apply(self, v: Vec2) -> Vec2 {
         vec2(self.cos * v.x - self.sin * v.y, self.sin * v.x + self.cos * v.y)
     }
 
     #[inline]
-    pub(super) fn apply_inverse(self, v: Vec2) -> Vec2 {
+    pub(crate) fn apply_inverse(self, v: Vec2) -> Vec2 {
         vec2(self.cos * v.x + self.sin * v.y, -self.sin * v.x + self.cos * v.y)
     }
 }
 
 /// A rotation, then a translation: from a body's frame to the world's.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::env::lunar_lander) struct Transform {
-    pub(in crate::env::lunar_lander) position: Vec2,
-    pub(super) rotation: Rotation,
+pub(crate) struct Transform {
+    pub(crate) position: Vec2,
+    pub(crate) rotation: Rotation,
 }
 
 impl Transform {
     /// The frame of a body whose centre of mass, at `local_center` in it, is at `center`.
     #[inline]
-    pub(super) fn about_center(center: Vec2, angle: f32, local_center: Vec2) -> Self {
+    pub(crate) fn about_center(center: Vec2, angle: f32, local_center: Vec2) -> Self {
         let rotation = Rotation::by(angle);
         Self { position: center - rotation.apply(local_center), rotation }
     }
 
     #[inline]
-    pub(in crate::env::lunar_lander) fn apply(self, v: Vec2) -> Vec2 {
+    pub(crate) fn apply(self, v: Vec2) -> Vec2 {
         // The grouping matters: the products are summed before the translation is added.
         self.rotation.apply(v) + self.position
     }
 
     #[inline]
-    pub(super) fn apply_inverse(self, v: Vec2) -> Vec2 {
+    pub(crate) fn apply_inverse(self, v: Vec2) -> Vec2 {
         self.rotation.apply_inverse(v - self.position)
     }
 }
 
 /// The motion of a body's centre of mass over one step, taken to be linear in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sweep {
+pub(crate) struct Sweep {
     /// The centre of mass in the body's frame.
-    pub(super) local_center: Vec2,
+    pub(crate) local_center: Vec2,
     /// The centre at `start`, in the world.
-    pub(super) center0: Vec2,
+    pub(crate) center0: Vec2,
     /// The centre at the end of the step.
-    pub(super) center: Vec2,
-    pub(super) angle0: f32,
-    pub(super) angle: f32,
+    pub(crate) center: Vec2,
+    pub(crate) angle0: f32,
+    pub(crate) angle: f32,
     /// The fraction of the step that is already behind, at which `center0` and `angle0` hold.
-    pub(super) start: f32,
+    pub(crate) start: f32,
 }
 
 impl Sweep {
     /// The body's frame at the fraction `beta` of what is left of the step.
     #[inline]
-    pub(super) fn transform(&self, beta: f32) -> Transform {
+    pub(crate) fn transform(&self, beta: f32) -> Transform {
         let center = (1.0 - beta) * self.center0 + beta * self.center;
         let angle = (1.0 - beta) * self.angle0 + beta * self.angle;
         Transform::about_center(center, angle, self.local_center)
@@ -226,7 +224,7 @@ impl Sweep {
 
     /// Lets the sweep begin at the fraction `time` of the step.
     #[inline]
-    pub(super) fn advance(&mut self, time: f32) {
+    pub(crate) fn advance(&mut self, time: f32) {
         let beta = (time - self.start) / (1.0 - self.start);
         self.center0 = (1.0 - beta) * self.center0 + beta * self.center;
         self.angle0 = (1.0 - beta) * self.angle0 + beta * self.angle;
@@ -235,7 +233,7 @@ impl Sweep {
 
     /// The same motion with `angle0` in [0, 2π).
     #[inline]
-    pub(super) fn unwound(mut self) -> Self {
+    pub(crate) fn unwound(mut self) -> Self {
         const TURN: f32 = 2.0 * std::f32::consts::PI;
         let turns = TURN * (self.angle0 / TURN).floor();
         self.angle0 -= turns;

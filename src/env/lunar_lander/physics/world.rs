@@ -11,54 +11,54 @@ use super::polygon::Polygon;
 use super::vector::{Vec2, min, vec2};
 
 /// The index of the hull among the bodies.
-pub(in crate::env::lunar_lander) const HULL: usize = 0;
+pub(crate) const HULL: usize = 0;
 /// The indices of the legs.
-pub(in crate::env::lunar_lander) const LEGS: [usize; 2] = [1, 2];
+pub(crate) const LEGS: [usize; 2] = [1, 2];
 
 /// How many edges the ground has: a floor, and the hills upon it.
-pub(in crate::env::lunar_lander) const EDGES: usize = 11;
+pub(crate) const EDGES: usize = 11;
 /// The box of an edge is this much larger than the edge and its skin, m.
 const EDGE_MARGIN: f32 = 0.1;
 /// A contact that has had more impacts than this in one step is let go.
 const MAX_IMPACTS: u32 = 8;
 
 /// What a body is made of.
-pub(in crate::env::lunar_lander) struct Part {
-    pub(in crate::env::lunar_lander) shape: Polygon,
+pub(crate) struct Part {
+    pub(crate) shape: Polygon,
     /// kg/m².
-    pub(in crate::env::lunar_lander) density: f32,
-    pub(in crate::env::lunar_lander) friction: f32,
-    pub(in crate::env::lunar_lander) position: Vec2,
-    pub(in crate::env::lunar_lander) angle: f32,
+    pub(crate) density: f32,
+    pub(crate) friction: f32,
+    pub(crate) position: Vec2,
+    pub(crate) angle: f32,
 }
 
 /// Three bodies above a ground.
 #[derive(Debug, Clone)]
-pub(in crate::env::lunar_lander) struct World {
-    pub(super) gravity: Vec2,
-    pub(in crate::env::lunar_lander) bodies: [Body; 3],
+pub(crate) struct World {
+    pub(crate) gravity: Vec2,
+    pub(crate) bodies: [Body; 3],
     /// `hinges[i]` holds leg `i`.
-    pub(super) hinges: [Hinge; 2],
+    pub(crate) hinges: [Hinge; 2],
     edges: [Edge; EDGES],
     edge_bounds: [Bounds; EDGES],
     edge_friction: [f32; EDGES],
     /// Where the ground's (motionless) sweep starts: how much of the step has been looked at.
-    pub(super) ground_start: f32,
+    pub(crate) ground_start: f32,
     /// Pairs whose boxes overlap, the newest last. They are visited newest first.
-    pub(super) contacts: Vec<Contact>,
+    pub(crate) contacts: Vec<Contact>,
     /// Room for the constraints of a step.
-    pub(super) rows: Vec<ContactRow>,
+    pub(crate) rows: Vec<ContactRow>,
     /// 1/s, of the last step; 0 before the first one.
     last_rate: f32,
     /// Whether the hull has ever begun to touch the ground.
-    pub(in crate::env::lunar_lander) hull_has_touched: bool,
+    pub(crate) hull_has_touched: bool,
     /// Whether the last news of each leg was that it began to touch an edge. A leg on two edges
     /// that leaves one of them is thus taken to be off the ground.
-    pub(in crate::env::lunar_lander) leg_contact: [bool; 2],
+    pub(crate) leg_contact: [bool; 2],
 }
 
 impl World {
-    pub(in crate::env::lunar_lander) fn new(
+    pub(crate) fn new(
         gravity: f32,
         edges: [(Edge, f32); EDGES],
         parts: [Part; 3],
@@ -87,7 +87,7 @@ impl World {
     }
 
     /// Goes on by `dt` seconds.
-    pub(in crate::env::lunar_lander) fn step(&mut self, dt: f32) {
+    pub(crate) fn step(&mut self, dt: f32) {
         if self.last_rate == 0.0 {
             self.find_contacts();
         }
@@ -101,7 +101,7 @@ impl World {
     }
 
     /// Adds pairs whose boxes have begun to overlap, by edge and then by body.
-    pub(super) fn find_contacts(&mut self) {
+    pub(crate) fn find_contacts(&mut self) {
         if !self.bodies.iter().any(|body| body.moved) {
             return;
         }
