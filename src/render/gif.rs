@@ -267,7 +267,7 @@ mod tests {
         }
         animation.hold(1.0);
         let delays: Vec<u16> = decode(&animation.finish()).iter().map(|f| f.1).collect();
-        assert_eq!(delays, [2, 2, 100 - 4 + 2]);
+        assert_eq!(delays, [2, 2, 100 - 4]);
     }
 
     #[test]
