@@ -188,10 +188,8 @@ impl Env for CliffWalking {
 impl Registered for CliffWalking {
     const SUMMARY: &'static str = "walk along a cliff to a goal: -1 per step, -100 for a fall";
 
-    const EXAMPLE: Example = Example {
-        potential: "0.0 - abs(s.row - s.goal_row) - abs(s.col - s.goal_col)",
-        bins: "",
-    };
+    const EXAMPLE: Example =
+        Example { potential: "0.0 - abs(s.row - s.goal_row) - abs(s.col - s.goal_col)", bins: "" };
 
     const KWARGS: &'static [KwargSpec] = &[KwargSpec {
         name: "is_slippery",

@@ -212,12 +212,14 @@ fn environments(engine: &mut Engine, context: &Rc<Context>) {
         let mut draft = new(id);
         call.finish(draft.merge(&kwargs, |key| call.key(key)).map(|()| draft))
     });
-    type D = Dynamic;
     let c = context.clone();
-    engine.register_fn("generate_random_map", move |n: NativeCallContext, size: D, p: D, seed: D| {
-        let call = Call::new(&c, &n);
-        call.finish(random_map(&call, &size, &p, &seed))
-    });
+    engine.register_fn(
+        "generate_random_map",
+        move |native: NativeCallContext, size: Dynamic, p: Dynamic, seed: Dynamic| {
+            let call = Call::new(&c, &native);
+            call.finish(random_map(&call, &size, &p, &seed))
+        },
+    );
 }
 
 fn random_map(

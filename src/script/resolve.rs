@@ -98,12 +98,8 @@ impl Resolver<'_> {
         let agent = draft.agent.as_ref().ok_or_else(|| {
             missing("agent", "add, for example, `agent: q_learning(#{ alpha: 0.1 })`")
         })?;
-        let (spec, any, note) = environment(draft)?
+        let (spec, any) = environment(draft, warnings)?
             .ok_or_else(|| missing("env", "add, for example, `env: \"CartPole-v1\"`"))?;
-        let place = draft.env.as_ref().and_then(|env| env.spot.place());
-        // Variants that inherit their environment say it once.
-        let note = note.map(|note| Diagnostic::warning(note).at(place));
-        warnings.extend(note.filter(|note| !warnings.contains(note)));
         let kwargs = draft.env.as_ref().map(|e| e.value.kwargs.clone()).unwrap_or_default();
         let kwargs = spec.resolve_kwargs(&kwargs).map_err(|e| env_error(draft, e))?;
         let agent = Located {
@@ -353,14 +349,18 @@ fn words(token: &str) -> impl Iterator<Item = &str> {
     token.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty())
 }
 
-/// The environment, and a note for the user if its id was not quite right.
+/// The environment; what there is to say about its id goes to `warnings`.
 fn environment(
     draft: &ExperimentDraft,
-) -> Result<Option<(&'static EnvSpec, AnyEnv, Option<String>)>, Diagnostic> {
+    warnings: &mut Vec<Diagnostic>,
+) -> Result<Option<(&'static EnvSpec, AnyEnv)>, Diagnostic> {
     let Some(env) = &draft.env else { return Ok(None) };
     let (spec, note) = env::find_with_note(&env.value.id).map_err(|e| env_error(draft, e))?;
+    // Variants that inherit their environment say it once.
+    let note = note.map(|note| Diagnostic::warning(note).at(env.spot.place()));
+    warnings.extend(note.filter(|note| !warnings.contains(note)));
     let any = spec.make(&env.value.kwargs).map_err(|e| env_error(draft, e))?;
-    Ok(Some((spec, any, note)))
+    Ok(Some((spec, any)))
 }
 
 fn env_error(draft: &ExperimentDraft, error: EnvError) -> Diagnostic {

@@ -110,7 +110,7 @@ impl Distance {
             self.largest = self.largest.max(sigmas);
         }
         let k = possible().count() as f64;
-        let statistic: f64 = possible().map(|(c, p)| (c - n * p).powi(2) / (n * p)).sum();
+        let statistic: f64 = possible().map(|(c, p)| (c - n * p) * (c - n * p) / (n * p)).sum();
         let inverses: f64 = possible().map(|(_, p)| 1.0 / p).sum();
         self.excess += statistic - (k - 1.0);
         self.variance += 2.0 * (k - 1.0) + (inverses - k * k - 2.0 * k + 2.0) / n;
@@ -147,7 +147,8 @@ fn distances(rules: Rules, model: &FiniteMdp, episodes: usize) -> [f64; 2] {
         for a in 0..2 {
             let counts = &counts[model.range(s, a)];
             if counts.iter().sum::<f64>() > 0.0 {
-                let probabilities: Vec<f64> = model.of(s, a).iter().map(|o| o.probability).collect();
+                let probabilities: Vec<f64> =
+                    model.of(s, a).iter().map(|o| o.probability).collect();
                 outcomes.add(counts, &probabilities);
             }
         }

@@ -14,5 +14,6 @@ mod readme;
 mod scripts;
 mod shaping;
 mod support;
+mod toy_text;
 mod unreadable;
 mod wiewiora;

@@ -151,7 +151,11 @@ impl Ends {
             (between(&self.scores[player + 1..]), draw, between(&self.scores[..player]))
         };
         let prize = if natural && rules == Rules::Natural { 1.5 } else { 1.0 };
-        vec![outcome(loss, s, -1.0, true), outcome(draw, s, 0.0, true), outcome(win, s, prize, true)]
+        vec![
+            outcome(loss, s, -1.0, true),
+            outcome(draw, s, 0.0, true),
+            outcome(win, s, prize, true),
+        ]
     }
 }
 

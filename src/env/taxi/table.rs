@@ -132,11 +132,7 @@ fn in_the_rain(forward: f64, state: TaxiState, direction: usize) -> Vec<Outcome>
         EAST => (NORTH, SOUTH),
         _ => (SOUTH, NORTH),
     };
-    vec![
-        drive(forward, state, direction),
-        drive(aside, state, left),
-        drive(aside, state, right),
-    ]
+    vec![drive(forward, state, direction), drive(aside, state, left), drive(aside, state, right)]
 }
 
 fn pick_up(state: TaxiState) -> Outcome {
