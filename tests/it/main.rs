@@ -11,6 +11,7 @@ mod numbers;
 mod parity;
 mod readme;
 mod scripts;
+mod setting;
 mod shaping;
 mod support;
 mod unreadable;
