@@ -13,12 +13,9 @@ mod learner;
 mod script;
 
 use divan::{Bencher, black_box};
-use runner::env::blackjack::{Blackjack, Rules};
 use runner::env::cart_pole::CartPole;
-use runner::env::cliff_walking::CliffWalking;
 use runner::env::frozen_lake::{FrozenLake, Ice};
 use runner::env::mountain_car::MountainCar;
-use runner::env::taxi::{Taxi, Whims};
 use runner::learn::{Behaviour, Schedule};
 use runner::mdp::Env;
 use runner::mdp::numpy::NumpyRng;
@@ -81,22 +78,6 @@ fn env_mountain_car(bencher: Bencher) {
 #[divan::bench]
 fn env_frozen_lake(bencher: Bencher) {
     walk(bencher, lake());
-}
-
-#[divan::bench]
-fn env_cliff_walking(bencher: Bencher) {
-    walk(bencher, CliffWalking::new(true));
-}
-
-#[divan::bench(args = [false, true])]
-fn env_taxi(bencher: Bencher, fickle: bool) {
-    let whims = Whims { rainy: Some(0.8), fickle: fickle.then_some(0.3) };
-    walk(bencher, Taxi::new(&whims).expect("the probabilities are sound"));
-}
-
-#[divan::bench]
-fn env_blackjack(bencher: Bencher) {
-    walk(bencher, Blackjack::new(Rules::SuttonBarto));
 }
 
 #[divan::bench]

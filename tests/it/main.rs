@@ -12,6 +12,7 @@ mod numbers;
 mod parity;
 mod readme;
 mod scripts;
+mod setting;
 mod shaping;
 mod support;
 mod toy_text;
