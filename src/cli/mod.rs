@@ -14,7 +14,9 @@ mod output;
 mod parity;
 mod play;
 mod rollout;
+mod screen;
 mod show;
+mod view;
 
 use std::process::ExitCode;
 

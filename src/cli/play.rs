@@ -1,15 +1,14 @@
 //! `runner play RESULTS`
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
 use super::output::note;
-use super::rollout::Format;
+use super::view::{View, ViewArgs};
 use super::{Failure, Outcome};
 use crate::env::Session;
-use crate::env::rollout::Length;
+use crate::env::rollout::{Event, Length};
 use crate::experiment::play::{PlayedEpisode, Policy, play, session};
 use crate::mdp::numpy::Seed;
 use crate::report::stored::Stored;
@@ -38,9 +37,8 @@ pub(super) struct Args {
     /// Stop after so many steps in all [default: no limit but the variant's; 10000 without one]
     #[arg(long, value_name = "MAX", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
-    /// How it is printed
-    #[arg(long, value_enum, default_value = "jsonl")]
-    format: Format,
+    #[command(flatten)]
+    view: ViewArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -63,12 +61,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         steps: args.steps.map_or(endless, |n| usize::try_from(n).unwrap_or(usize::MAX)),
         episodes: args.episodes as usize,
     };
-    let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
-    let Format::Jsonl = args.format;
-    let played = play(&mut session, &mut policy, &env_seed, length, |_: &Session, event| {
-        Ok(event.write(&mut stdout)?)
-    })?;
-    stdout.flush()?;
+    let mut view = View::open(&args.view, &session)?;
+    let each = |session: &Session, event: Event<'_>| view.event(session, event);
+    let played = play(&mut session, &mut policy, &env_seed, length, each);
+    let Some(played) = view.finish(played)? else { return Ok(Outcome::Fine) };
     for (i, episode) in played.iter().enumerate() {
         note(&describe(i + 1, episode));
     }

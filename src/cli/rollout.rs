@@ -1,13 +1,14 @@
 //! `runner rollout ENV`
 
-use std::io::Write;
 use std::path::Path;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 
+use super::output::note;
+use super::view::{View, ViewArgs};
 use super::{Failure, Outcome};
-use crate::env::Session;
-use crate::env::rollout::{Event, Length, parse_actions, random_policy, rollout, rollout_actions};
+use crate::env::rollout::{Event, Length, drive, parse_actions, random_policy};
+use crate::env::{PlayedAction, Session, find_with_note};
 use crate::experiment::play::{Policy, play};
 use crate::experiment::read_table;
 use crate::mdp::numpy::Seed;
@@ -33,15 +34,8 @@ pub(super) struct Args {
     /// Number of steps that the policy plays
     #[arg(long, value_name = "N", default_value_t = 100, conflicts_with = "actions")]
     steps: usize,
-    /// How it is printed
-    #[arg(long, value_enum, default_value = "jsonl")]
-    format: Format,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum Format {
-    /// One JSON object a line
-    Jsonl,
+    #[command(flatten)]
+    view: ViewArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -56,25 +50,38 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let seed: Seed =
         args.seed.parse().map_err(|e| Failure::Message(format!("--seed: {e}"), None))?;
-    let mut session = Session::new(&args.env, &kwargs)?;
-    let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
-    let Format::Jsonl = args.format;
-    let played = if let Some(actions) = &args.actions {
-        let actions = parse_actions(actions, &session.action_space())?;
-        rollout_actions(&mut session, &seed, &actions, &mut stdout)
-    } else if args.policy == "random" {
-        let stream = Stream::new(seed.words()[0].into(), "policy");
-        let mut policy = random_policy(&session, stream);
-        rollout(&mut session, &seed, args.steps, |_| policy(), &mut stdout)
-    } else {
-        let mut policy = table_policy(&session, Path::new(&args.policy))?;
-        let length = Length { steps: args.steps, episodes: usize::MAX };
-        let each = |_: &Session, event: Event<'_>| Ok(event.write(&mut stdout)?);
-        play(&mut session, &mut policy, &seed, length, each).map(|_| ())
+    let (spec, remark) = find_with_note(&args.env)?;
+    if let Some(remark) = remark {
+        note(&remark);
+    }
+    let mut session = Session::new(spec.id, &kwargs)?;
+    let actions = match &args.actions {
+        Some(actions) => Some(parse_actions(actions, &session.action_space())?),
+        None => None,
     };
-    let flushed = stdout.flush();
-    played.map_err(Failure::from)?;
-    flushed.map(|()| Outcome::Fine).map_err(Failure::from)
+    let mut policy = match actions {
+        Some(_) => None,
+        None if args.policy == "random" => None,
+        None => Some(table_policy(&session, Path::new(&args.policy))?),
+    };
+    let mut view = View::open(&args.view, &session)?;
+    let steps = actions.as_ref().map_or(args.steps, Vec::len);
+    let length = Length { steps, episodes: usize::MAX };
+    let each = |session: &Session, event: Event<'_>| view.event(session, event);
+    let played = if let Some(actions) = actions {
+        let mut next = actions.into_iter();
+        // There are exactly as many calls as actions.
+        let list = |_: &Session, _: &_| Ok(next.next().unwrap_or(PlayedAction::Index(-1)));
+        drive(&mut session, &seed, length, list, each)
+    } else if let Some(policy) = &mut policy {
+        play(&mut session, policy, &seed, length, each).map(|_| ())
+    } else {
+        let stream = Stream::new(seed.words()[0].into(), "policy");
+        let mut random = random_policy(&session, stream);
+        drive(&mut session, &seed, length, |_, _| Ok(random()), each)
+    };
+    view.finish(played)?;
+    Ok(Outcome::Fine)
 }
 
 /// The greedy policy of a `policy.csv`. Its rows are states only where the environment is finite:

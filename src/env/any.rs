@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use super::actions::ActionTable;
+use super::actions::{ActionTable, PlayedAction};
 use super::error::EnvError;
-use super::registered::{Observation, Registered, Seen};
+use super::registered::{ActionMask, Observation, Registered, Seen};
 use super::registry::AnyEnv;
+use super::scene::{Draw, Scene, TextPicture};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{ActionSpace, Env, FiniteMdp, Schema, Step};
 
 /// An environment, seen through a vtable: for sessions, which are dynamic in every step.
 pub(super) trait Dynamic {
-    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen);
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen, Option<ActionMask>);
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
     fn step_box(&mut self, action: &[f32], rng: &mut NumpyRng) -> DynamicStep;
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
@@ -25,6 +26,9 @@ pub(super) trait Dynamic {
     fn action_space(&self) -> ActionSpace;
     fn schema(&self) -> Schema;
     fn finite(&self) -> Option<&Arc<FiniteMdp>>;
+    fn scene(&self, last: Option<&PlayedAction>) -> Scene;
+    fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture>;
+    fn n_states(&self) -> Option<usize>;
 }
 
 /// What [`Dynamic::step`] returns.
@@ -35,23 +39,24 @@ pub(super) struct DynamicStep {
     pub(super) terminated: bool,
     /// The probability of the outcome, on finite environments.
     pub(super) probability: Option<f64>,
+    /// Which actions can do anything next, where Gymnasium says so.
+    pub(super) mask: Option<ActionMask>,
 }
 
 impl DynamicStep {
     fn new<E: Registered>(env: &E, step: Step<E::Obs>) -> Self {
-        let probability = Env::finite(env)
-            .zip(env.outcome_index(&step.obs))
-            .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
+        let (probability, mask) = (env.probability(&step.obs), env.action_mask(&step.obs));
         let (reward, terminated) = (step.reward, step.terminated);
         let seen = Seen::of(env, &step.obs);
-        Self { obs: step.obs.into(), seen, reward, terminated, probability }
+        Self { obs: step.obs.into(), seen, reward, terminated, probability, mask }
     }
 }
 
 impl<E: Registered> Dynamic for E {
-    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen) {
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen, Option<ActionMask>) {
         let obs = Env::reset(self, rng);
-        (obs.into(), Seen::of(self, &obs))
+        let mask = self.action_mask(&obs);
+        (obs.into(), Seen::of(self, &obs), mask)
     }
 
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
@@ -95,6 +100,18 @@ impl<E: Registered> Dynamic for E {
     fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         Env::finite(self)
     }
+
+    fn n_states(&self) -> Option<usize> {
+        Env::n_states(self)
+    }
+
+    fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        Draw::scene(self, last)
+    }
+
+    fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        Draw::text(self, last)
+    }
 }
 
 impl AnyEnv {
@@ -121,5 +138,20 @@ impl AnyEnv {
     /// Its model, if it has a finite one.
     pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         self.dynamic().finite()
+    }
+
+    /// Number of its states, if they are finite (with a model or without).
+    pub fn n_states(&self) -> Option<usize> {
+        self.dynamic().n_states()
+    }
+
+    /// What its present state looks like; `last` is the action that led to it.
+    pub fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        self.dynamic().scene(last)
+    }
+
+    /// Its present state in characters, if it is a world for them.
+    pub fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        self.dynamic().text(last)
     }
 }

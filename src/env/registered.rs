@@ -1,15 +1,19 @@
 //! What an environment provides beyond its dynamics to stand in the registry.
 
-use serde::Serialize;
+use std::fmt;
+
+use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::actions::ActionTable;
 use super::error::EnvError;
 use super::kwargs::{KwargSpec, Kwargs};
+use super::scene::Draw;
 use crate::mdp::{Env, FiniteState, MAX_FIELDS};
 
 /// An observation whose type is known at run time only. Serialises as Gymnasium's would: a bare
-/// integer, or a list of float32 in the shortest decimal that reads back as the same float32.
+/// integer, a list of float32 in the shortest decimal that reads back as the same float32, or a
+/// list of integers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Observation {
@@ -17,6 +21,8 @@ pub enum Observation {
     Index(i64),
     /// An array of float32 (`Box`).
     Box(Vec<f32>),
+    /// Several integers (`Tuple` of `Discrete`).
+    Tuple(Vec<i64>),
 }
 
 impl<const N: usize> From<[f32; N]> for Observation {
@@ -49,6 +55,24 @@ impl Seen {
     }
 }
 
+/// Which actions can do anything in a state, one flag per action: Gymnasium's
+/// `info["action_mask"]`. Displayed and serialised as one character per action, `1` for those that
+/// can: `110000`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ActionMask(pub Vec<bool>);
+
+impl fmt::Display for ActionMask {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|&can| f.write_str(if can { "1" } else { "0" }))
+    }
+}
+
+impl Serialize for ActionMask {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// What `runner new` writes, and suggestions show: sensible, not tuned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Example {
@@ -59,7 +83,7 @@ pub struct Example {
 }
 
 /// An environment that can be made from an id and arguments.
-pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
+pub trait Registered: Env<Obs: Into<Observation>> + Draw + Clone + 'static {
     /// One line for `list`.
     const SUMMARY: &'static str;
 
@@ -88,6 +112,18 @@ pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
     /// If an option's value is not allowed.
     fn set_reset_options(&mut self, _options: &Map<String, Value>) -> Result<(), EnvError> {
         Ok(())
+    }
+
+    /// The probability of the outcome that led to `obs`: Gymnasium's `info["prob"]`. `None` after a
+    /// reset and where there is no table of outcomes.
+    fn probability(&self, obs: &Self::Obs) -> Option<f64> {
+        let (mdp, outcome) = self.finite().zip(self.outcome_index(obs))?;
+        Some(mdp.outcomes()[outcome].probability)
+    }
+
+    /// Which actions can do anything after `obs`, in environments for which Gymnasium says so.
+    fn action_mask(&self, _obs: &Self::Obs) -> Option<ActionMask> {
+        None
     }
 
     /// Where actions are real numbers: the ones that agents choose among.

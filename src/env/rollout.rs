@@ -5,6 +5,9 @@
 //! {"type":"step","action":1,"obs":[…],"reward":1.0,"terminated":false,"truncated":false}
 //! ```
 //!
+//! Where Gymnasium gives an action mask, each line ends in it: `"mask":"110000"`, one character per
+//! action, `1` for those that can do anything next.
+//!
 //! After an episode has ended, the next action starts another one with an unseeded reset, whose
 //! line has `"seed":null`. Where actions are real numbers, `action` is a list.
 
@@ -15,7 +18,7 @@ use serde::Serialize;
 
 use super::actions::PlayedAction;
 use super::error::EnvError;
-use super::registered::Observation;
+use super::registered::{ActionMask, Observation};
 use super::session::{Session, SessionStep};
 use crate::mdp::ActionSpace;
 use crate::mdp::numpy::Seed;
@@ -73,6 +76,8 @@ pub enum Event<'a> {
         seed: Option<&'a Seed>,
         /// The first observation.
         obs: &'a Observation,
+        /// Which actions can do anything, where Gymnasium says so.
+        mask: Option<&'a ActionMask>,
     },
     /// An action was played.
     Step {
@@ -90,7 +95,7 @@ impl Event<'_> {
     /// If `out` refuses it.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         match *self {
-            Self::Reset { seed, obs } => write_reset(out, seed, obs),
+            Self::Reset { seed, obs, mask } => write_reset(out, seed, obs, mask),
             Self::Step { action, step } => {
                 serde_json::to_writer(&mut *out, &StepLine { r#type: "step", action, step })?;
                 out.write_all(b"\n")
@@ -122,7 +127,7 @@ pub fn drive(
     mut each: impl FnMut(&Session, Event<'_>) -> Result<(), RolloutError>,
 ) -> Result<(), RolloutError> {
     let mut obs = session.reset(Some(seed), None)?;
-    each(session, Event::Reset { seed: Some(seed), obs: &obs })?;
+    each(session, Event::Reset { seed: Some(seed), obs: &obs, mask: session.action_mask() })?;
     let (mut episodes, mut ended) = (0, false);
     for i in 0..length.steps {
         if episodes == length.episodes {
@@ -130,7 +135,7 @@ pub fn drive(
         }
         if ended {
             obs = session.reset(None, None)?;
-            each(session, Event::Reset { seed: None, obs: &obs })?;
+            each(session, Event::Reset { seed: None, obs: &obs, mask: session.action_mask() })?;
         }
         let action = policy(session, &obs)?;
         let step = session.step(&action).map_err(|mut error| {
@@ -245,11 +250,17 @@ fn split_actions(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-fn write_reset(out: &mut dyn Write, seed: Option<&Seed>, obs: &Observation) -> io::Result<()> {
+fn write_reset(
+    out: &mut dyn Write,
+    seed: Option<&Seed>,
+    obs: &Observation,
+    mask: Option<&ActionMask>,
+) -> io::Result<()> {
     // A seed may be too large for any integer type: it is written as the digits it displays.
     let seed = seed.map_or_else(|| "null".to_owned(), Seed::to_string);
     let obs = serde_json::to_string(obs)?;
-    writeln!(out, r#"{{"type":"reset","seed":{seed},"obs":{obs}}}"#)
+    let mask = mask.map_or_else(String::new, |mask| format!(r#","mask":"{mask}""#));
+    writeln!(out, r#"{{"type":"reset","seed":{seed},"obs":{obs}{mask}}}"#)
 }
 
 #[cfg(test)]
@@ -286,6 +297,24 @@ mod tests {
             play("CartPole-v1", &json!({}), "0", "0"),
             r#"{"type":"reset","seed":0,"obs":[0.013696169,-0.02302133,-0.045902647,-0.048347235]}
 {"type":"step","action":0,"obs":[0.013235742,-0.21745604,-0.04686959,0.22950698],"reward":1.0,"terminated":false,"truncated":false}
+"#
+        );
+    }
+
+    #[test]
+    fn masks_and_tuples_are_written() {
+        // Gymnasium: the masks of states 314, 214 and 234.
+        assert_eq!(
+            play("Taxi-v4", &json!({}), "0", "1,2"),
+            r#"{"type":"reset","seed":0,"obs":314,"mask":"110000"}
+{"type":"step","action":1,"obs":214,"reward":-1.0,"terminated":false,"truncated":false,"mask":"111000"}
+{"type":"step","action":2,"obs":234,"reward":-1.0,"terminated":false,"truncated":false,"mask":"111100"}
+"#
+        );
+        assert_eq!(
+            play("Blackjack-v1", &json!({}), "0", "1"),
+            r#"{"type":"reset","seed":0,"obs":[11,10,0]}
+{"type":"step","action":1,"obs":[12,10,0],"reward":0.0,"terminated":false,"truncated":false}
 "#
         );
     }

@@ -16,8 +16,9 @@ use serde_json::{Map, Value};
 use super::actions::{ActionTable, PlayedAction, checked_box};
 use super::config::EnvConfig;
 use super::error::EnvError;
-use super::registered::{Observation, Seen};
+use super::registered::{ActionMask, Observation, Seen};
 use super::registry::{AnyEnv, EnvSpec, find};
+use super::scene::{Scene, TextPicture};
 use crate::mdp::numpy::{NumpyRng, Seed};
 use crate::mdp::{ActionSpace, Schema};
 
@@ -36,6 +37,9 @@ pub struct SessionStep {
     /// The probability of this outcome, on finite environments: Gymnasium's `info["prob"]`.
     #[serde(skip)]
     pub probability: Option<f64>,
+    /// Which actions can do anything next, in environments for which Gymnasium says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mask: Option<ActionMask>,
 }
 
 /// An environment, its random stream and its time limit.
@@ -51,6 +55,7 @@ pub struct Session {
     /// Steps since the last reset; `None` before the first one.
     elapsed: Option<u32>,
     seen: Seen,
+    mask: Option<ActionMask>,
 }
 
 impl Session {
@@ -71,7 +76,17 @@ impl Session {
         let schema = env.schema();
         let (limit, reset_options) = (spec.max_steps, config.reset_options.clone());
         let seen = Seen::default();
-        Ok(Self { spec, env, schema, rng: None, limit, reset_options, elapsed: None, seen })
+        Ok(Self {
+            spec,
+            env,
+            schema,
+            rng: None,
+            limit,
+            reset_options,
+            elapsed: None,
+            seen,
+            mask: None,
+        })
     }
 
     /// Replaces the time limit: -1 means none.
@@ -93,9 +108,9 @@ impl Session {
         &self.schema
     }
 
-    /// Number of states of the environment's model, if it has one.
+    /// Number of states, if they are finite (with a model or without).
     pub fn n_states(&self) -> Option<usize> {
-        self.env.finite().map(|mdp| mdp.n_states())
+        self.env.n_states()
     }
 
     /// The index of the present state in the environment's model, if it has one; `None` before the
@@ -137,6 +152,22 @@ impl Session {
         self.limit
     }
 
+    /// Which actions can do anything in the present state, in environments for which Gymnasium
+    /// says so (after the first reset).
+    pub fn action_mask(&self) -> Option<&ActionMask> {
+        self.mask.as_ref()
+    }
+
+    /// What the present state looks like; `last` is the action that led to it: none after a reset.
+    pub fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        self.env.scene(last)
+    }
+
+    /// The present state in characters, if it is a world for them.
+    pub fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        self.env.text(last)
+    }
+
     /// Sets an attribute, for example `CartPole`'s `kinematics_integrator`.
     ///
     /// # Errors
@@ -167,8 +198,8 @@ impl Session {
             (None, None) => return Err(EnvError::about("seed", "the first reset needs a seed")),
         };
         self.spec.set_reset_options(&mut self.env, options)?;
-        let (obs, seen) = self.env.dynamic_mut().reset(&mut rng);
-        self.seen = seen;
+        let (obs, seen, mask) = self.env.dynamic_mut().reset(&mut rng);
+        (self.seen, self.mask) = (seen, mask);
         self.rng = Some(rng);
         self.elapsed = Some(0);
         Ok(obs)
@@ -201,12 +232,14 @@ impl Session {
         };
         *elapsed = elapsed.saturating_add(1);
         self.seen = step.seen;
+        self.mask.clone_from(&step.mask);
         Ok(SessionStep {
             obs: step.obs,
             reward: step.reward,
             terminated: step.terminated,
             truncated: self.limit.is_some_and(|limit| *elapsed >= limit),
             probability: step.probability,
+            mask: step.mask,
         })
     }
 }

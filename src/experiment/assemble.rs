@@ -39,12 +39,12 @@ pub(super) fn potential<E: Env + Clone + 'static>(
             let states = env.clone();
             let mut at = move |index: usize| {
                 let mut fields = [0.0; MAX_FIELDS];
-                let obs = states.state(index).expect("only finite environments index their states");
+                let obs = states.state(index).expect("StateIndex is given to finite states only");
                 states.fields(&obs, &mut fields);
                 phi(&fields[..n_fields])
             };
             // Reachable states at once, so that a mistake shows before training; the others, which
-            // may be junk, never.
+            // may be junk, never. Without a model nobody knows which those are.
             let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
             let mut table = vec![f64::NAN; n_cells];
             for (index, _) in reachable.iter().enumerate().filter(|(_, r)| **r) {

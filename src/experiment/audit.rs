@@ -87,14 +87,22 @@ impl EnvVisitor for Judge<'_> {
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let (host, variant) = (self.host, self.variant);
         let potential_only = variant.reward.is_none() && variant.terms.is_empty();
-        let DiscretiserSpec::StateIndex = variant.discretiser else {
-            return Ok(match (potential_only, variant.potential_on) {
-                (true, PhiOn::Cell) => Audit::new(
-                    "potential-based",
-                    Some(true),
-                    "by construction, for the discretised problem: Φ is constant on each cell",
-                ),
-                (true, PhiOn::Raw) => {
+        let plain = match variant.discretiser {
+            DiscretiserSpec::StateIndex => env.finite(),
+            DiscretiserSpec::Bins(_) | DiscretiserSpec::Cells { .. } => None,
+        };
+        let Some(plain) = plain else {
+            let by_construction = match variant.discretiser {
+                DiscretiserSpec::StateIndex => {
+                    "by construction: Φ is a function of the state; there is no model to check it on"
+                }
+                _ => "by construction, for the discretised problem: Φ is constant on each cell",
+            };
+            let is_constant = variant.potential_on == PhiOn::Cell
+                || matches!(variant.discretiser, DiscretiserSpec::StateIndex);
+            return Ok(match (potential_only, is_constant) {
+                (true, true) => Audit::new("potential-based", Some(true), by_construction),
+                (true, false) => {
                     Audit::new("not checked", None, "Φ of the raw state is not constant on cells")
                 }
                 (false, _) => {
@@ -113,7 +121,6 @@ impl EnvVisitor for Judge<'_> {
                 }
             },
         };
-        let plain = env.finite().expect("StateIndex is given to finite environments only");
         let gamma = variant.agent.float("gamma");
         let Ok(result) = preservation(plain, &model.shaped, gamma, &model.phi) else {
             return Ok(Audit::new(

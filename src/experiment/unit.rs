@@ -124,7 +124,7 @@ impl EnvVisitor for RunUnit<'_> {
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         match &self.variant.discretiser {
             DiscretiserSpec::StateIndex => {
-                let n_states = env.finite().map_or(0, |mdp| mdp.n_states());
+                let n_states = env.n_states().unwrap_or(0);
                 self.with_discretiser(env, StateIndex { n_states })
             }
             DiscretiserSpec::Bins(dims) => {

@@ -13,8 +13,10 @@ use super::draft::{
 use super::engine::Context;
 use super::params::{merge_agent, number, per_step, show, whole};
 use super::plan::GoldenBudget;
+use crate::env::frozen_lake::{MAX_TILES, random_map_within};
 use crate::learn::registry::{AGENTS, AgentSpec};
 use crate::learn::{AgentConfig, Schedule, Unit};
+use crate::mdp::numpy::Seed;
 use crate::shaping::MAX_CELLS;
 
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
@@ -210,6 +212,37 @@ fn environments(engine: &mut Engine, context: &Rc<Context>) {
         let mut draft = new(id);
         call.finish(draft.merge(&kwargs, |key| call.key(key)).map(|()| draft))
     });
+    type D = Dynamic;
+    let c = context.clone();
+    engine.register_fn(
+        "generate_random_map",
+        move |n: NativeCallContext, size: D, p: D, seed: D| {
+            let call = Call::new(&c, &n);
+            call.finish(random_map(&call, &size, &p, &seed))
+        },
+    );
+}
+
+fn random_map(
+    call: &Call<'_>,
+    size: &Dynamic,
+    p: &Dynamic,
+    seed: &Dynamic,
+) -> Result<Array, Diagnostic> {
+    let at = |i: usize| move |d: Diagnostic| d.at(call.arg(i).place());
+    let size = whole("the size of a random map", size, 2, 100).map_err(at(0))? as usize;
+    let p = number(p).ok_or_else(|| {
+        at(1)(Diagnostic::error(format!("the p of a random map is a number, got {}", show(p))))
+    })?;
+    let seed = whole("the seed of a random map", seed, 0, i64::MAX).map_err(at(2))? as u64;
+    // Tiles are work like any other that the script has done.
+    let Context { operations, max_operations, .. } = call.context;
+    let budget = max_operations.get().saturating_sub(operations.get()).min(MAX_TILES);
+    let mut left = budget;
+    let map = random_map_within(size, p, &Seed::from(seed), &mut left);
+    operations.set(operations.get() + budget - left);
+    let rows = map.map_err(|e| at(1)(Diagnostic::error(e.message).maybe_hint(e.hint)))?;
+    Ok(rows.into_iter().map(Dynamic::from).collect())
 }
 
 fn agent(engine: &mut Engine, context: &Rc<Context>, spec: &'static AgentSpec) {

@@ -98,8 +98,12 @@ impl Resolver<'_> {
         let agent = draft.agent.as_ref().ok_or_else(|| {
             missing("agent", "add, for example, `agent: q_learning(#{ alpha: 0.1 })`")
         })?;
-        let (spec, any) = environment(draft)?
+        let (spec, any, note) = environment(draft)?
             .ok_or_else(|| missing("env", "add, for example, `env: \"CartPole-v1\"`"))?;
+        let place = draft.env.as_ref().and_then(|env| env.spot.place());
+        // Variants that inherit their environment say it once.
+        let note = note.map(|note| Diagnostic::warning(note).at(place));
+        warnings.extend(note.filter(|note| !warnings.contains(note)));
         let kwargs = draft.env.as_ref().map(|e| e.value.kwargs.clone()).unwrap_or_default();
         let kwargs = spec.resolve_kwargs(&kwargs).map_err(|e| env_error(draft, e))?;
         let agent = Located {
@@ -167,22 +171,26 @@ impl Resolver<'_> {
         env: &AnyEnv,
         schema: &Schema,
     ) -> Result<DiscretiserSpec, Diagnostic> {
-        let finite = env.finite().is_some();
-        if agent.value.is_planner() && (!finite || draft.discretiser.is_some()) {
-            let why = if finite { "it plans on the states themselves" } else { "it has none" };
+        let has_model = env.finite().is_some();
+        if agent.value.is_planner() && (!has_model || draft.discretiser.is_some()) {
+            let why = match (has_model, env.n_states()) {
+                (true, _) => "it plans on the states themselves",
+                (false, None) => "it has none",
+                (false, Some(_)) => "with these arguments it has none",
+            };
             return Err(Diagnostic::error(format!(
                 "`{}` needs the finite model of {}: {why}",
                 agent.value.spec.name, spec.id
             ))
             .at(agent.spot.place())
-            .hint(if finite {
+            .hint(if has_model {
                 "leave out the discretiser"
             } else {
                 "q_learning or sarsa learn without a model"
             }));
         }
         match draft.discretiser.as_ref() {
-            None if finite => Ok(DiscretiserSpec::StateIndex),
+            None if env.n_states().is_some() => Ok(DiscretiserSpec::StateIndex),
             // It does not look at states.
             None if agent.value.spec.name == "random_agent" => {
                 Ok(DiscretiserSpec::Bins(vec![Dim { field: 0, lo: 0.0, hi: 1.0, n: 1 }]))
@@ -345,11 +353,14 @@ fn words(token: &str) -> impl Iterator<Item = &str> {
     token.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty())
 }
 
-fn environment(draft: &ExperimentDraft) -> Result<Option<(&'static EnvSpec, AnyEnv)>, Diagnostic> {
+/// The environment, and a note for the user if its id was not quite right.
+fn environment(
+    draft: &ExperimentDraft,
+) -> Result<Option<(&'static EnvSpec, AnyEnv, Option<String>)>, Diagnostic> {
     let Some(env) = &draft.env else { return Ok(None) };
-    let spec = env::find(&env.value.id).map_err(|e| env_error(draft, e))?;
+    let (spec, note) = env::find_with_note(&env.value.id).map_err(|e| env_error(draft, e))?;
     let any = spec.make(&env.value.kwargs).map_err(|e| env_error(draft, e))?;
-    Ok(Some((spec, any)))
+    Ok(Some((spec, any, note)))
 }
 
 fn env_error(draft: &ExperimentDraft, error: EnvError) -> Diagnostic {

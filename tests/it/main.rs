@@ -1,5 +1,6 @@
 //! Integration tests: one binary, one module a subject.
 
+mod blackjack;
 mod cli;
 mod crash;
 mod env;
