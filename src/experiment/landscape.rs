@@ -128,13 +128,14 @@ impl EnvVisitor for ListStates {
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let n_fields = env.schema().fields.len();
-        let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
-        let state = |(index, acts): (usize, bool)| {
+        // Without a model nobody knows which states are reached.
+        let reachable = env.finite().map(|mdp| mdp.reachable());
+        let state = |index: usize| {
             let mut fields = vec![0.0; n_fields];
-            let obs = env.state(index).expect("only finite environments index their states");
+            let obs = env.state(index).expect("finite states have an index");
             env.fields(&obs, &mut fields);
-            ListedState { fields, acts }
+            ListedState { fields, acts: reachable.as_ref().is_none_or(|r| r[index]) }
         };
-        reachable.into_iter().enumerate().map(state).collect()
+        (0..env.n_states().unwrap_or(0)).map(state).collect()
     }
 }

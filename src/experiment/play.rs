@@ -67,6 +67,9 @@ pub struct PlayedEpisode {
 ///
 /// # Errors
 /// If a scripted discretiser fails, and what `each` reports.
+///
+/// # Panics
+/// Never: a step follows a reset.
 pub fn play(
     session: &mut Session,
     policy: &mut Policy,
