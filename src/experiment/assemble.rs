@@ -83,7 +83,8 @@ pub(super) fn reward<E: Env + Clone + 'static>(
     let callbacks = host.callbacks();
     let mut scripted =
         ScriptedReward::<E>(callbacks.reward(variant.reward.as_ref(), &terms, &schema));
-    if let Some(mdp) = env.finite() {
+    // Over several frames the last outcome alone does not determine the reward.
+    if let (Some(mdp), 1) = (env.finite(), variant.frame_skip) {
         callbacks.clear_step_read();
         let table = tabulate(env, mdp, terms.len(), &mut scripted)?;
         if !callbacks.step_read() {
@@ -197,6 +198,10 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
             })
         }
         AnyReward::Scripted(_) => return Err(NotAModel("t.step").fault(variant)),
+    };
+    let base = match variant.clip_reward {
+        Some([low, high]) => base.with_rewards(|_, _, o| o.reward.clamp(low, high)),
+        None => base,
     };
     let mut phi = vec![0.0; mdp.n_states()];
     let mut potential = potential(host, variant, env, mdp.n_states())?;

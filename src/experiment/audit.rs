@@ -66,13 +66,10 @@ impl Audit {
 /// # Errors
 /// If a callback fails.
 pub fn audit_variant(host: &Host, variant: &Variant) -> Result<Audit, Diagnostic> {
-    if variant.potential.is_none() && variant.reward.is_none() && variant.terms.is_empty() {
+    if variant.potential.is_none() && !variant.changes_reward() {
         return Ok(Audit::new("unshaped", Some(true), "the agent learns from the native reward"));
     }
-    let env = variant
-        .env
-        .make(&variant.kwargs)
-        .map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+    let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     env.visit(Judge { host, variant })
 }
 
@@ -86,27 +83,34 @@ impl EnvVisitor for Judge<'_> {
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let (host, variant) = (self.host, self.variant);
-        let potential_only = variant.reward.is_none() && variant.terms.is_empty();
-        let plain = match variant.discretiser {
-            DiscretiserSpec::StateIndex => env.finite(),
-            DiscretiserSpec::Bins(_) | DiscretiserSpec::Cells { .. } => None,
-        };
-        let Some(plain) = plain else {
-            let by_construction = match variant.discretiser {
-                DiscretiserSpec::StateIndex => {
-                    "by construction: Φ is a function of the state; there is no model to check it on"
-                }
-                _ => "by construction, for the discretised problem: Φ is constant on each cell",
-            };
-            let is_constant = variant.potential_on == PhiOn::Cell
-                || matches!(variant.discretiser, DiscretiserSpec::StateIndex);
-            return Ok(match (potential_only, is_constant) {
-                (true, true) => Audit::new("potential-based", Some(true), by_construction),
-                (true, false) => {
+        let potential_only = !variant.changes_reward();
+        let DiscretiserSpec::StateIndex = variant.discretiser else {
+            return Ok(match (potential_only, variant.potential_on) {
+                (true, PhiOn::Cell) => Audit::new(
+                    "potential-based",
+                    Some(true),
+                    "by construction, for the discretised problem: Φ is constant on each cell",
+                ),
+                (true, PhiOn::Raw) => {
                     Audit::new("not checked", None, "Φ of the raw state is not constant on cells")
                 }
                 (false, _) => {
-                    Audit::new("not checked", None, "a scripted reward without a finite model")
+                    Audit::new("not checked", None, "a changed reward without a finite model")
+                }
+            });
+        };
+        let Some(plain) = env.finite().filter(|_| variant.frame_skip == 1) else {
+            return Ok(match (potential_only, variant.frame_skip) {
+                (true, _) => Audit::new(
+                    "potential-based",
+                    Some(true),
+                    "by construction: Φ is a function of the state",
+                ),
+                (false, 1) => {
+                    Audit::new("not checked", None, "a changed reward without a finite model")
+                }
+                (false, _) => {
+                    Audit::new("not checked", None, "a changed reward, summed over skipped frames")
                 }
             });
         };

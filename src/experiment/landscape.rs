@@ -25,7 +25,7 @@ impl Locate {
                 Self::Bins(Bins::new(dims).expect("checked when the plan was resolved"))
             }
             DiscretiserSpec::Cells { shape, cell } => {
-                Self::Cells(host.callbacks().cells(cell, shape, schema))
+                Self::Cells(host.callbacks().cells(cell, shape, &variant.normalise, schema))
             }
         }
     }
@@ -67,10 +67,8 @@ impl Landscape {
     /// # Errors
     /// If the environment cannot be made.
     pub fn new(host: &Host, variant: &Variant) -> Result<Self, Diagnostic> {
-        let env = variant
-            .env
-            .make(&variant.kwargs)
-            .map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+        let env =
+            variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
         let schema = env.schema();
         let by_index = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
         let locate = Locate::new(host, variant, &schema);

@@ -215,8 +215,7 @@ fn spots(landscape: &mut Landscape, frame: &Frame) -> Result<Vec<Spot>, StoredEr
 }
 
 fn label(variant: &Variant, quantity: Quantity) -> String {
-    let scripted = variant.reward.is_some() || !variant.terms.is_empty();
-    let of = if scripted { ", of the reward it learned from" } else { "" };
+    let of = if variant.changes_reward() { ", of the reward it learned from" } else { "" };
     match quantity {
         Quantity::Value if variant.potential.is_some() => {
             format!("V = max Q + Φ{of} (what was learned, the potential added back)")

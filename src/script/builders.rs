@@ -1,6 +1,5 @@
 //! The functions with which a script builds its plan.
 
-use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, Map, NativeCallContext};
@@ -13,6 +12,7 @@ use super::draft::{
 use super::engine::Context;
 use super::params::{merge_agent, number, per_step, show, whole};
 use super::plan::GoldenBudget;
+use super::setting::Entries;
 use crate::env::frozen_lake::{MAX_TILES, random_map_within};
 use crate::learn::registry::{AGENTS, AgentSpec};
 use crate::learn::{AgentConfig, Schedule, Unit};
@@ -200,24 +200,19 @@ pub(super) fn experiments_of(list: &Array) -> Result<Vec<ExperimentDraft>, Diagn
 }
 
 fn environments(engine: &mut Engine, context: &Rc<Context>) {
-    let new = |id: &str| EnvDraft {
-        id: id.to_string(),
-        kwargs: serde_json::Map::new(),
-        kwarg_spots: BTreeMap::new(),
-    };
+    let new = |id: &str| EnvDraft { id: id.to_string(), kwargs: Entries::default() };
     engine.register_fn("env", move |id: &str| new(id));
     let c = context.clone();
     engine.register_fn("env", move |native: NativeCallContext, id: &str, kwargs: Map| {
         let call = Call::new(&c, &native);
         let mut draft = new(id);
-        call.finish(draft.merge(&kwargs, |key| call.key(key)).map(|()| draft))
+        call.finish(draft.kwargs.merge(&kwargs, |key| call.key(key)).map(|()| draft))
     });
-    type D = Dynamic;
     let c = context.clone();
     engine.register_fn(
         "generate_random_map",
-        move |n: NativeCallContext, size: D, p: D, seed: D| {
-            let call = Call::new(&c, &n);
+        move |native: NativeCallContext, size: Dynamic, p: Dynamic, seed: Dynamic| {
+            let call = Call::new(&c, &native);
             call.finish(random_map(&call, &size, &p, &seed))
         },
     );

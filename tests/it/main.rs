@@ -13,6 +13,7 @@ mod parity;
 mod play;
 mod readme;
 mod scripts;
+mod setting;
 mod shaping;
 mod show;
 mod support;

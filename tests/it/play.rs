@@ -106,7 +106,7 @@ fn bins_and_scripted_cells_play_what_their_table_says() {
     assert!(said.contains("episode 1: 150 steps, return -150, truncated"), "{said}");
     assert!(by_bins.trim_end().ends_with(r#""terminated":false,"truncated":true}"#));
     let (_, said) = lines("bins", &["--steps", "40", "--episodes", "2"]);
-    assert!(said.contains("episode 1: 40 steps, return -40, stopped by --steps"), "{said}");
+    assert!(said.contains("episode 1: 40 steps, return -40, stopped\n"), "{said}");
 
     // The same from the file, by hand: the first of the best actions, 0 where nothing was learned.
     let mut table = vec![[0.0f64; 3]; 256];
@@ -130,6 +130,46 @@ fn bins_and_scripted_cells_play_what_their_table_says() {
         );
         assert!(line.starts_with(&expected), "{line}\nnot {expected}");
     }
+}
+
+/// An action is held for as long as in training, and real-valued ones are played as such.
+#[test]
+fn the_setting_of_a_variant_is_played_in() {
+    let dir = folder();
+    let script = r#"
+        study("setting", [experiment(#{
+            name: "skip", env: "FrozenLake-v1", agent: q_learning(#{ epsilon: 0.5 }),
+            episodes: 200, seeds: 1, frame_skip: 3, max_steps: 8,
+        }), experiment(#{
+            name: "push", env: "MountainCarContinuous-v0", agent: q_learning(),
+            discretiser: bins(#{ position: [-1.2, 0.6, 4], velocity: [-0.07, 0.07, 4] }),
+            actions: [[-0.5], [0.75]], episodes: 3, seeds: 1, max_steps: 50,
+        })])
+    "#;
+    let results = stored(dir.path(), script);
+    let actions = |variant: &str| -> Vec<Vec<serde_json::Value>> {
+        let output = play(&results, &["--variant", variant, "--episodes", "5"]);
+        expect_code(&output, 0);
+        let lines = stdout(&output);
+        let lines = lines.lines().map(|l| serde_json::from_str::<serde_json::Value>(l).unwrap());
+        let mut episodes = Vec::new();
+        for line in lines {
+            match line["type"].as_str().unwrap() {
+                "reset" => episodes.push(Vec::new()),
+                _ => episodes.last_mut().unwrap().push(line["action"].clone()),
+            }
+        }
+        episodes
+    };
+    let episodes = actions("skip");
+    assert_eq!(episodes.len(), 5);
+    for episode in &episodes {
+        assert!(episode.len() <= 8);
+        assert!(episode.chunks(3).all(|held| held.iter().all(|a| *a == held[0])), "{episode:?}");
+    }
+    assert!(episodes.iter().flatten().any(|a| *a != episodes[0][0]), "more than one action");
+    let pushes = [serde_json::json!([-0.5]), serde_json::json!([0.75])];
+    assert!(actions("push").iter().flatten().all(|a| pushes.contains(a)));
 }
 
 #[test]
