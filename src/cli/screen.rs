@@ -63,7 +63,9 @@ impl Screen {
         let Some(frame) = self.moving else {
             // A blank line between the pictures.
             let _ = writeln!(out, "{}{caption}", if self.begun { "\n" } else { "" });
-            picture.iter().for_each(|line| out.extend([line, "\n"]));
+            for line in &picture {
+                let _ = writeln!(out, "{line}");
+            }
             self.begun = true;
             return print(&out);
         };
@@ -83,12 +85,12 @@ impl Screen {
         self.wait(if last { frame.max(LAST) } else { frame })
     }
 
-    /// Waits until `time` after the end of the last wait.
+    /// Waits until `time` after the end of the last wait, or from now on if that is long past: late
+    /// pictures do not make the next ones hurry.
     fn wait(&mut self, time: Duration) -> io::Result<()> {
         let now = Instant::now();
-        // Late pictures do not make the next ones hurry.
-        let due =
-            self.due.map_or(now, |due| due.max(now - time.min(Duration::from_millis(100)))) + time;
+        let due = self.due.unwrap_or(now) + time;
+        let due = due.max(now);
         self.due = Some(due);
         loop {
             if STOP.load(Ordering::Relaxed) {

@@ -29,11 +29,13 @@ enum Style {
 }
 
 impl Image {
-    /// An image of one colour. Both sides are at least 1 and at most 2^16.
+    /// An image of one colour. Both sides are at least 1 and at most 2^14.
+    ///
+    /// # Panics
+    /// If there is no memory for it.
     pub fn new(width: u32, height: u32, colour: Colour) -> Self {
-        let side = |length: u32| length.clamp(1, 1 << 16);
-        let mut pixels =
-            Pixmap::new(side(width), side(height)).expect("such sides make an image of some GB");
+        let side = |length: u32| length.clamp(1, 1 << 14);
+        let mut pixels = Pixmap::new(side(width), side(height)).expect("a GB of memory");
         pixels.fill(skia(colour));
         Self { pixels }
     }

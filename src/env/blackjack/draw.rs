@@ -75,8 +75,12 @@ impl Blackjack {
     /// What the hands count.
     fn labels(&self, open: bool) -> (String, String) {
         let dealer = self.dealer_cards();
-        let visible = if open { dealer } else { &dealer[..dealer.len().min(1)] };
-        (count(visible), count(self.player_cards()))
+        let dealer = match dealer.first() {
+            Some(1) if !open => "A + ?".into(),
+            Some(first) if !open => format!("{first} + ?"),
+            _ => count(dealer),
+        };
+        (dealer, count(self.player_cards()))
     }
 }
 
@@ -103,24 +107,20 @@ fn count(cards: &[u8]) -> String {
 fn card(rank: Option<&str>) -> Vec<Shape> {
     let [width, height] = CARD;
     let mut shapes = vec![Shape::card(width + 0.04, height + 0.04, 0.12, INK)];
-    match rank {
-        Some(rank) => {
-            let colour = if rank == "A" { RED } else { INK };
-            shapes.push(Shape::card(width, height, 0.1, WHITE));
-            shapes.push(Shape::text([-0.3, 0.48], 0.3, colour, rank));
-            shapes.push(Shape::text([0.0, -0.08], 0.76, colour, rank));
-        }
-        None => {
-            shapes.push(Shape::card(width, height, 0.1, WHITE));
-            shapes.push(Shape::card(width - 0.14, height - 0.14, 0.06, BLUE));
-            for x in [-0.24, 0.0, 0.24] {
-                for y in [-0.42, -0.14, 0.14, 0.42] {
-                    let d = 0.08;
-                    let diamond = [[x - d, y], [x, y + d], [x + d, y], [x, y - d]];
-                    shapes.push(Shape::polygon(diamond, BLUE.mixed(WHITE, 0.5)));
-                }
-            }
-        }
+    shapes.push(Shape::card(width, height, 0.1, WHITE));
+    if let Some(rank) = rank {
+        let colour = if rank == "A" { RED } else { INK };
+        shapes.push(Shape::text([-0.3, 0.48], 0.3, colour, rank));
+        shapes.push(Shape::text([0.0, -0.08], 0.76, colour, rank));
+        return shapes;
+    }
+    shapes.push(Shape::card(width - 0.14, height - 0.14, 0.06, BLUE));
+    for (x, y) in
+        [-0.24, 0.0, 0.24].into_iter().flat_map(|x| [-0.42, -0.14, 0.14, 0.42].map(|y| (x, y)))
+    {
+        let d = 0.08;
+        let diamond = [[x - d, y], [x, y + d], [x + d, y], [x, y - d]];
+        shapes.push(Shape::polygon(diamond, BLUE.mixed(WHITE, 0.5)));
     }
     shapes
 }

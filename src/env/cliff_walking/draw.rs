@@ -45,16 +45,16 @@ impl Draw for CliffWalking {
 /// A fall without a bottom, with a jagged edge.
 fn abyss() -> Vec<Shape> {
     let edge = [
-        [-0.5, 0.48],
-        [0.5, 0.48],
-        [0.5, 0.3],
+        [-0.51, 0.48],
+        [0.51, 0.48],
+        [0.51, 0.3],
         [0.3, 0.38],
         [0.1, 0.26],
         [-0.12, 0.36],
         [-0.32, 0.24],
-        [-0.5, 0.3],
+        [-0.51, 0.3],
     ];
-    let depth = Shape::rect([-0.5, -0.5], [0.5, 0.48], NIGHT);
+    let depth = Shape::rect([-0.51, -0.5], [0.51, 0.48], NIGHT);
     vec![depth, Shape::polygon(edge, EARTH)]
 }
 

@@ -25,12 +25,12 @@ impl Draw for Taxi {
         for (&(row, col), (letter, colour)) in LOCATIONS.iter().zip(PLACES) {
             let place = [
                 Shape::square(0.96, colour.mixed(PAPER, 0.35)),
-                Shape::text([-0.32, 0.3], 0.24, INK, letter),
+                Shape::text([-0.3, 0.28], 0.3, INK, letter),
             ];
             scene.add_at(cell(row, col), &place);
         }
         for (row, col) in (0..ROWS).flat_map(|row| (0..COLS).map(move |col| (row, col))) {
-            if is_walled_to_the_east(row, col) {
+            if col + 1 < COLS && is_walled_to_the_east(row, col) {
                 let [x, y] = cell(row, col);
                 let wall = [[x + 0.5, y + 0.45], [x + 0.5, y - 0.45]];
                 scene.add(Shape::line(wall, 0.09, INK));
