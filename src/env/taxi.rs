@@ -13,7 +13,7 @@
 //!
 //! # Action Space
 //! `Discrete(6)`: 0 south, 1 north, 2 east, 3 west, 4 pickup, 5 dropoff. A move against a wall or
-//! the border stays where it is. [`Taxi::action_mask`] says which actions can do anything, and
+//! the border stays where it is. [`TaxiState::action_mask`] says which actions can do anything, and
 //! rollouts print it.
 //!
 //! # Observation Space
@@ -67,6 +67,7 @@ mod tests;
 
 use std::sync::Arc;
 
+use table::N_ACTIONS;
 pub use table::{COLS, LOCATIONS, ROWS, TaxiState, is_walled_to_the_east};
 
 use super::error::EnvError;
@@ -74,8 +75,6 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{ActionMask, Example, Registered};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Env, Field, FieldKind, FiniteEnv, FiniteMdp, FiniteState, Schema, Step};
-
-const N_ACTIONS: usize = 6;
 
 /// What may go otherwise than intended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,11 +113,6 @@ impl Taxi {
     /// The state it is in.
     pub fn now(&self) -> TaxiState {
         TaxiState::decode(self.env.state() as usize)
-    }
-
-    /// Which actions can do anything in state `index`, in the order of the actions.
-    pub fn action_mask(index: usize) -> [bool; N_ACTIONS] {
-        table::mask(TaxiState::decode(index))
     }
 
     /// After a step from state `before`: changes the destination if this is the moment to do so.
@@ -305,6 +299,6 @@ impl Registered for Taxi {
     }
 
     fn action_mask(&self, obs: &FiniteState) -> Option<ActionMask> {
-        Some(ActionMask(Self::action_mask(obs.index as usize).to_vec()))
+        Some(ActionMask(TaxiState::decode(obs.index as usize).action_mask().to_vec()))
     }
 }

@@ -110,7 +110,7 @@ impl Distance {
             self.largest = self.largest.max(sigmas);
         }
         let k = possible().count() as f64;
-        let statistic: f64 = possible().map(|(c, p)| (c - n * p).powi(2) / (n * p)).sum();
+        let statistic: f64 = possible().map(|(c, p)| (c - n * p) * (c - n * p) / (n * p)).sum();
         let inverses: f64 = possible().map(|(_, p)| 1.0 / p).sum();
         self.excess += statistic - (k - 1.0);
         self.variance += 2.0 * (k - 1.0) + (inverses - k * k - 2.0 * k + 2.0) / n;
@@ -161,7 +161,7 @@ fn the_game_is_played_as_the_model_says() {
     for rules in RULES {
         let env = Blackjack::new(rules);
         let model = env.finite().unwrap();
-        let sigmas = distances(rules, model, 200_000);
+        let sigmas = distances(rules, model, 2_000_000);
         assert!(sigmas.iter().all(|sigma| *sigma < 5.0), "{rules:?}: {sigmas:?}");
     }
 }
@@ -173,14 +173,4 @@ fn a_wrong_model_would_be_found() {
     let [_, impossible] = distances(Rules::Plain, sab.finite().unwrap(), 200_000);
     let [_, too_rare] = distances(Rules::SuttonBarto, plain.finite().unwrap(), 200_000);
     assert!(impossible == f64::INFINITY && too_rare > 5.0, "{impossible}, {too_rare}");
-}
-
-#[test]
-#[ignore = "ten million episodes of each: a minute without optimisation"]
-fn the_game_is_played_as_the_model_says_at_length() {
-    for rules in RULES {
-        let env = Blackjack::new(rules);
-        let sigmas = distances(rules, env.finite().unwrap(), 10_000_000);
-        assert!(sigmas.iter().all(|sigma| *sigma < 5.0), "{rules:?}: {sigmas:?}");
-    }
 }

@@ -17,5 +17,6 @@ mod setting;
 mod shaping;
 mod show;
 mod support;
+mod toy_text;
 mod unreadable;
 mod wiewiora;

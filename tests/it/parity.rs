@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use flate2::read::GzDecoder;
 use runner::env::frozen_lake::generate_random_map;
 use runner::env::recording::{ParityReport, Tolerance, replay, replay_file, tolerance};
-use runner::env::taxi::Taxi;
+use runner::env::taxi::TaxiState;
 use runner::env::{ActionMask, make, specs};
 use runner::mdp::{ActionSpace, Outcome, Schema};
 use serde_json::{Map, Value, json};
@@ -234,7 +234,11 @@ fn every_taxi_mask_is_gymnasiums() {
         serde_json::from_value(gzipped("taxi_masks.json.gz")["mask"].take()).unwrap();
     assert_eq!(masks.len(), 500);
     for (s, mask) in masks.iter().enumerate() {
-        assert_eq!(ActionMask(Taxi::action_mask(s).to_vec()).to_string(), *mask, "state {s}");
+        assert_eq!(
+            ActionMask(TaxiState::decode(s).action_mask().to_vec()).to_string(),
+            *mask,
+            "state {s}"
+        );
     }
 }
 

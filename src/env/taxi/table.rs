@@ -11,6 +11,7 @@ pub const LOCATIONS: [(usize, usize); 4] = [(0, 0), (0, 4), (4, 0), (4, 3)];
 
 pub(super) const N_STATES: usize = ROWS * COLS * 5 * 4;
 
+pub(super) const N_ACTIONS: usize = 6;
 const SOUTH: usize = 0;
 const NORTH: usize = 1;
 const EAST: usize = 2;
@@ -54,6 +55,14 @@ impl TaxiState {
         LOCATIONS.get(self.passenger).copied().unwrap_or((self.row, self.col))
     }
 
+    /// Which actions can do anything here, in the order of the actions: Gymnasium's
+    /// `action_mask`.
+    pub fn action_mask(self) -> [bool; N_ACTIONS] {
+        let open = |direction| self.moved(direction).is_some();
+        let can_drop = self.passenger == Self::IN_TAXI && self.location().is_some();
+        [open(SOUTH), open(NORTH), open(EAST), open(WEST), self.can_pick_up(), can_drop]
+    }
+
     /// The location at which the taxi is.
     fn location(self) -> Option<usize> {
         LOCATIONS.iter().position(|&place| place == (self.row, self.col))
@@ -82,13 +91,6 @@ pub fn is_walled_to_the_east(row: usize, col: usize) -> bool {
     matches!((row, col), (0 | 1, 1) | (3 | 4, 0 | 2)) || col + 1 == COLS
 }
 
-/// Which actions can do anything.
-pub(super) fn mask(state: TaxiState) -> [bool; 6] {
-    let open = |direction| state.moved(direction).is_some();
-    let can_drop = state.passenger == TaxiState::IN_TAXI && state.location().is_some();
-    [open(SOUTH), open(NORTH), open(EAST), open(WEST), state.can_pick_up(), can_drop]
-}
-
 /// The probability of each initial state: the passenger waits at one location and wants to another.
 pub(super) fn initial() -> Vec<f64> {
     let starts = |state: TaxiState| {
@@ -107,7 +109,7 @@ pub(super) fn table(rainy: Option<f64>) -> Vec<Vec<Vec<Outcome>>> {
         (PICKUP, _) => vec![pick_up(state)],
         _ => vec![drop_off(state)],
     };
-    let row = |s| (0..6).map(|a| outcomes(TaxiState::decode(s), a)).collect();
+    let row = |s| (0..N_ACTIONS).map(|a| outcomes(TaxiState::decode(s), a)).collect();
     (0..N_STATES).map(row).collect()
 }
 
