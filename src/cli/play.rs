@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 fn describe(number: usize, episode: &PlayedEpisode) -> String {
-    let ending = episode.ending.map_or("stopped by --steps", |e| e.as_str());
+    let ending = episode.ending.map_or("stopped", |e| e.as_str());
     let plural = if episode.steps == 1 { "" } else { "s" };
     format!("episode {number}: {} step{plural}, return {}, {ending}", episode.steps, episode.native)
 }

@@ -1,5 +1,6 @@
 //! `runner show RESULTS`
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
@@ -140,15 +141,11 @@ fn tables(stored: &Stored, index: usize, seeds: Seeds) -> Result<Tables, Failure
         let seed = if let Seeds::One(seed) = seeds { Some(seed) } else { None };
         let unit = stored.unit(index, seed)?;
         let learned = vec![stored.learned(unit)?];
-        return Ok(Tables { learned, label: format!("seed {}", unit.seed) });
+        return Ok(Tables { learned, seeds: vec![unit.seed] });
     }
-    let own = stored.units.iter().filter(|u| u.variant == index);
-    let learned: Vec<_> = own.map(|unit| stored.learned(unit)).collect::<Result<_, _>>()?;
-    let label = match learned.len() {
-        1 => "1 seed".into(),
-        n => format!("{n} seeds: mean values, the action that most take"),
-    };
-    Ok(Tables { learned, label })
+    let own = || stored.units.iter().filter(|u| u.variant == index);
+    let learned = own().map(|unit| stored.learned(unit)).collect::<Result<_, _>>()?;
+    Ok(Tables { learned, seeds: own().map(|u| u.seed).collect() })
 }
 
 fn quantities(args: &Args) -> Vec<Quantity> {
@@ -213,7 +210,7 @@ fn write(folder: &Path, pictures: &[Picture]) -> Result<(), Failure> {
 fn file_stem(picture: &Picture) -> String {
     let mut name = format!("{}-{}", picture.variant, picture.quantity.as_str());
     for (field, value) in &picture.at {
-        name.push_str(&format!("-{field}={value}"));
+        let _ = write!(name, "-{field}={value}");
     }
     let plain = |c: char| if c.is_alphanumeric() || "-_=.".contains(c) { c } else { '_' };
     name.chars().map(plain).collect::<String>().trim_start_matches('.').to_string()

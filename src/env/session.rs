@@ -108,6 +108,11 @@ impl Session {
         &self.schema
     }
 
+    /// Steps since the last reset.
+    pub fn elapsed(&self) -> u32 {
+        self.elapsed.unwrap_or(0)
+    }
+
     /// Number of states, if they are finite (with a model or without).
     pub fn n_states(&self) -> Option<usize> {
         self.env.n_states()

@@ -25,7 +25,7 @@ impl Locate {
                 Self::Bins(Bins::new(dims).expect("checked when the plan was resolved"))
             }
             DiscretiserSpec::Cells { shape, cell } => {
-                Self::Cells(host.callbacks().cells(cell, shape, schema))
+                Self::Cells(host.callbacks().cells(cell, shape, &variant.normalise, schema))
             }
         }
     }
@@ -67,10 +67,8 @@ impl Landscape {
     /// # Errors
     /// If the environment cannot be made.
     pub fn new(host: &Host, variant: &Variant) -> Result<Self, Diagnostic> {
-        let env = variant
-            .env
-            .make(&variant.kwargs)
-            .map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+        let env =
+            variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
         let schema = env.schema();
         let by_index = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
         let locate = Locate::new(host, variant, &schema);
@@ -128,13 +126,14 @@ impl EnvVisitor for ListStates {
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let n_fields = env.schema().fields.len();
-        let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
-        let state = |(index, acts): (usize, bool)| {
+        // Without a model nobody knows which states are reached.
+        let reachable = env.finite().map(|mdp| mdp.reachable());
+        let state = |index: usize| {
             let mut fields = vec![0.0; n_fields];
-            let obs = env.state(index).expect("only finite environments index their states");
+            let obs = env.state(index).expect("finite states have an index");
             env.fields(&obs, &mut fields);
-            ListedState { fields, acts }
+            ListedState { fields, acts: reachable.as_ref().is_none_or(|r| r[index]) }
         };
-        reachable.into_iter().enumerate().map(state).collect()
+        (0..env.n_states().unwrap_or(0)).map(state).collect()
     }
 }

@@ -125,7 +125,8 @@ struct Choice<'a> {
     telling: Vec<usize>,
 }
 
-/// The frames of a variant's pictures: one, or one per value of a remaining field that has two.
+/// The frames of a variant's pictures: one, or one per value of a remaining field that has two
+/// common ones.
 ///
 /// # Errors
 /// If `request` names a field that there is not, or one that cannot be an axis.
@@ -163,7 +164,10 @@ pub(super) fn frames(
     for &f in &fixed {
         let name = choice.fields()[f].name;
         let values = choice.values(f);
-        if values.len() == 2 && request.at.iter().all(|(n, _)| n != name) {
+        if values.len() == 2
+            && values.iter().all(|v| choice.is_common(f, *v))
+            && request.at.iter().all(|(n, _)| n != name)
+        {
             bases = bases
                 .iter()
                 .flat_map(|base| values.iter().map(|v| set(base.clone(), f, *v)))
@@ -199,26 +203,30 @@ fn acting(states: &[ListedState]) -> Vec<&ListedState> {
     states.iter().filter(|s| s.acts).collect()
 }
 
-/// The fields that tell states apart: the binned ones; on finite environments whole numbers, but
-/// for a state index where the others do without it; else all.
+/// The fields that tell states apart: the binned ones; on finite environments the first whole
+/// numbers that do (a state's index does too, but says nothing); else all.
 fn telling(landscape: &Landscape, variant: &Variant) -> Vec<usize> {
     let fields = &landscape.schema.fields;
-    match (&variant.discretiser, &landscape.states) {
-        (DiscretiserSpec::Bins(dims), _) => dims.iter().map(|d| d.field).collect(),
-        (_, Some(states)) => {
-            let mut telling: Vec<usize> =
-                (0..fields.len()).filter(|&f| fields[f].kind == FieldKind::Int).collect();
-            for f in telling.clone().into_iter().rev() {
-                let rest: Vec<usize> = telling.iter().copied().filter(|&g| g != f).collect();
-                if distinct(states, &[f]) == states.len() && distinct(states, &rest) == states.len()
-                {
-                    telling = rest;
-                }
-            }
-            telling
-        }
-        _ => (0..fields.len()).collect(),
+    let states = match (&variant.discretiser, &landscape.states) {
+        (DiscretiserSpec::Bins(dims), _) => return dims.iter().map(|d| d.field).collect(),
+        (_, Some(states)) => states,
+        _ => return (0..fields.len()).collect(),
+    };
+    if landscape.schema.grid.is_some() {
+        let place = |name| fields.iter().position(|f| f.name == name);
+        return [place("row"), place("col")].into_iter().flatten().collect();
     }
+    let mut telling: Vec<usize> =
+        (0..fields.len()).filter(|&f| fields[f].kind == FieldKind::Int).collect();
+    let (index, last_first): (Vec<usize>, Vec<usize>) =
+        telling.iter().rev().partition(|&&f| distinct(states, &[f]) == states.len());
+    for f in index.into_iter().chain(last_first) {
+        let rest: Vec<usize> = telling.iter().copied().filter(|&g| g != f).collect();
+        if distinct(states, &rest) == states.len() {
+            telling = rest;
+        }
+    }
+    telling
 }
 
 /// How many states can be told apart by these fields, all of them whole numbers.
@@ -248,6 +256,12 @@ impl Choice<'_> {
         values.sort_by(f64::total_cmp);
         values.dedup();
         values
+    }
+
+    /// Whether a tenth or more of the states have this value: a rare one is worth no picture.
+    fn is_common(&self, field: usize, value: f64) -> bool {
+        let states = acting(self.landscape.states.as_deref().unwrap_or_default());
+        10 * states.iter().filter(|s| s.fields[field] == value).count() >= states.len()
     }
 
     fn check_value(&self, name: &str, field: usize, value: f64) -> Result<(), StoredError> {

@@ -198,7 +198,7 @@ pub(super) fn legend(picture: &Picture, ink: Ink) -> String {
 /// A value with four significant digits or so.
 pub(super) fn value_text(v: f64) -> String {
     minus(&match v.abs() {
-        m if m == 0.0 => "0".into(),
+        0.0 => "0".into(),
         m if m < 1e-3 => format!("{v:.2e}"),
         m if m < 10.0 => format!("{v:.3}"),
         m if m < 100.0 => format!("{v:.2}"),

@@ -72,7 +72,7 @@ pub struct Tiles {
 pub struct Picture {
     /// The variant's name.
     pub variant: String,
-    /// Whose table it is: `seed 0`, or `mean of 20 seeds`.
+    /// Whose numbers these are: `seed 0`, or `mean over 20 seeds`.
     pub seeds: String,
     /// What is shown.
     pub quantity: Quantity,
@@ -92,16 +92,26 @@ pub struct Picture {
     pub tiles: Option<Tiles>,
 }
 
-/// The tables to be pictured, and whose they are.
+/// The tables to be pictured.
 #[derive(Debug)]
 pub struct Tables {
     /// One per seed, of one shape.
     pub learned: Vec<Learned>,
-    /// `seed 0`, or `mean of 20 seeds`.
-    pub label: String,
+    /// The seeds.
+    pub seeds: Vec<u64>,
 }
 
 impl Tables {
+    /// Whose numbers a picture shows.
+    fn whose(&self, quantity: Quantity) -> String {
+        match (self.seeds.as_slice(), quantity) {
+            (_, Quantity::Potential) => "the same for every seed".into(),
+            ([seed], _) => format!("seed {seed}"),
+            (seeds, Quantity::Value) => format!("mean over {} seeds", seeds.len()),
+            (seeds, Quantity::Policy) => format!("what most of {} seeds do", seeds.len()),
+        }
+    }
+
     /// The mean over the seeds that know a cell of their largest value there.
     fn value(&self, cell: usize) -> Option<f64> {
         let own = self.learned.iter().filter(|l| l.experienced[cell]);
@@ -145,7 +155,7 @@ pub fn pictures(
     let mut landscape = Landscape::new(host, variant)?;
     let mut pictures = Vec::new();
     for frame in frames(&landscape, variant, request)? {
-        let cells = places(&mut landscape, &frame)?;
+        let cells = spots(&mut landscape, &frame)?;
         for &quantity in quantities {
             if quantity == Quantity::Potential && variant.potential.is_none() {
                 continue;
@@ -155,7 +165,7 @@ pub fn pictures(
             {
                 continue;
             }
-            let of = |place: &Option<(usize, Option<f64>)>| match *place {
+            let of = |spot: &Spot| match *spot {
                 None => Place::Nothing,
                 Some((cell, phi)) => {
                     let known = match quantity {
@@ -169,7 +179,7 @@ pub fn pictures(
             let grid = landscape.schema.grid.as_ref().filter(|_| frame.is_map);
             pictures.push(Picture {
                 variant: variant.name.clone(),
-                seeds: tables.label.clone(),
+                seeds: tables.whose(quantity),
                 quantity,
                 label: label(variant, quantity),
                 at: frame.at.clone(),
@@ -184,21 +194,17 @@ pub fn pictures(
     Ok(pictures)
 }
 
-/// Per place of `frame` the row of the table and Φ there.
-fn places(
-    landscape: &mut Landscape,
-    frame: &Frame,
-) -> Result<Vec<Option<(usize, Option<f64>)>>, StoredError> {
+/// The row of the table at a place, and Φ there; `None` where no episode can be and act.
+type Spot = Option<(usize, Option<f64>)>;
+
+fn spots(landscape: &mut Landscape, frame: &Frame) -> Result<Vec<Spot>, StoredError> {
     let mut cells = Vec::with_capacity(frame.x.n * frame.y.n);
     for (i, j) in (0..frame.y.n).flat_map(|j| (0..frame.x.n).map(move |i| (i, j))) {
-        let state = match &landscape.states {
-            Some(states) => {
-                frame.listed(states, i, j).map(|cell| (cell, states[cell].fields.clone()))
-            }
-            None => {
-                let fields = frame.fields(i, j);
-                landscape.cell(&fields)?.map(|cell| (cell, fields))
-            }
+        let state = if let Some(states) = &landscape.states {
+            frame.listed(states, i, j).map(|cell| (cell, states[cell].fields.clone()))
+        } else {
+            let fields = frame.fields(i, j);
+            landscape.cell(&fields)?.map(|cell| (cell, fields))
         };
         cells.push(match state {
             None => None,
@@ -209,8 +215,7 @@ fn places(
 }
 
 fn label(variant: &Variant, quantity: Quantity) -> String {
-    let scripted = variant.reward.is_some() || !variant.terms.is_empty();
-    let of = if scripted { ", of the reward it learned from" } else { "" };
+    let of = if variant.changes_reward() { ", of the reward it learned from" } else { "" };
     match quantity {
         Quantity::Value if variant.potential.is_some() => {
             format!("V = max Q + Φ{of} (what was learned, the potential added back)")
@@ -221,13 +226,8 @@ fn label(variant: &Variant, quantity: Quantity) -> String {
     }
 }
 
-fn tiles(
-    grid: &Grid,
-    cells: &[Option<(usize, Option<f64>)>],
-    tables: &Tables,
-    quantity: Quantity,
-) -> Tiles {
-    let arrows = |cell: &Option<(usize, Option<f64>)>| match cell {
+fn tiles(grid: &Grid, cells: &[Spot], tables: &Tables, quantity: Quantity) -> Tiles {
+    let arrows = |spot: &Spot| match spot {
         Some((cell, _)) if quantity != Quantity::Potential => {
             tables.actions(*cell).into_iter().map(|a| grid.arrows[a]).collect()
         }

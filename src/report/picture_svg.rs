@@ -145,6 +145,17 @@ fn places(svg: &mut String, picture: &Picture, at: (f64, f64), size: (f64, f64))
 
 /// A map's letters, arrows and values.
 fn draw_tiles(svg: &mut String, picture: &Picture, tiles: &Tiles, at: (f64, f64), side: f64) {
+    let mut lines = String::new();
+    let (wide, tall) = (picture.x.n as f64 * side, picture.y.n as f64 * side);
+    for i in 1..picture.x.n {
+        let x = coordinate(at.0 + i as f64 * side);
+        let _ = write!(lines, "M{x},{}v{}", coordinate(at.1), coordinate(tall));
+    }
+    for j in 1..picture.y.n {
+        let y = coordinate(at.1 + j as f64 * side);
+        let _ = write!(lines, "M{},{y}h{}", coordinate(at.0), coordinate(wide));
+    }
+    let _ = writeln!(svg, "<path d=\"{lines}\" stroke=\"#fff\" stroke-opacity=\"0.6\"/>");
     for (k, letter) in tiles.letters.iter().enumerate() {
         let (i, j) = (k % picture.x.n, k / picture.x.n);
         let (left, top) = (at.0 + i as f64 * side, at.1 + j as f64 * side);

@@ -326,7 +326,13 @@ fn difference(plan: &Plan, units: &[Unit], identity: &Value) -> Option<String> {
     let file = match import {
         _ if edited(&sources.script, &identity["script"]) => "script.rhai".to_string(),
         Some((path, _)) => path.clone(),
-        None => return Some("study.json was changed after the run".into()),
+        None => {
+            return Some(
+                "its script is the one that was run, but study.json was changed, or written by \
+                 another version of runner"
+                    .into(),
+            );
+        }
     };
     let what = match changed {
         Some((_, v)) if run.contains(&v.name) => format!("variant `{}` is another now", v.name),
