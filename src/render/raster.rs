@@ -149,14 +149,6 @@ impl Image {
         self.pixels.stroke_path(path, &paint(colour), &stroke, Transform::identity(), None);
     }
 
-    /// Fills everything below `top` with a colour.
-    pub(super) fn bar(&mut self, top: i32, colour: Colour) {
-        let (width, height) = (self.width() as f32, self.height() as f32);
-        if let Some(bar) = Rect::from_ltrb(0.0, top as f32, width, height) {
-            self.pixels.fill_rect(bar, &paint(colour), Transform::identity(), None);
-        }
-    }
-
     /// Sets a pixel.
     #[cfg(test)]
     pub(super) fn dot(&mut self, x: i32, y: i32, Colour(r, g, b): Colour) {

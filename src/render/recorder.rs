@@ -108,10 +108,9 @@ impl Recorder {
         let strip = face.height() + 8;
         // Even, for those who turn the file into a video.
         let high = (height(scene, width) + strip as u32 + 1) & !1;
-        let mut image = Image::new(width, high, WHITE);
+        let mut image = Image::new(width, high, MIST.mixed(WHITE, 0.4));
         let top = high as i32 - strip;
         image.paint(scene);
-        image.bar(top, MIST.mixed(WHITE, 0.4));
         let (margin, gap) = (8, face.width("  "));
         let end = width as i32 - margin - face.width(right);
         image.text(end, top + 4, face, INK, right);

@@ -7,8 +7,8 @@ use crate::env::scene::{Draw, Point, Scene, Shape, placed};
 use crate::mdp::math;
 
 /// The edges of the picture.
-const LOW: Point = [MIN_POSITION - 0.06, -0.08];
-const HIGH: Point = [MAX_POSITION + 0.06, 1.22];
+const LOW: Point = [MIN_POSITION - 0.1, -0.08];
+const HIGH: Point = [MAX_POSITION + 0.1, 1.22];
 
 impl Draw for MountainCar {
     const FPS: u32 = 30;
@@ -67,8 +67,7 @@ fn car(push: f64) -> Vec<Shape> {
         shapes.push(Shape::disc([x, 0.026], 0.026, INK));
         shapes.push(Shape::disc([x, 0.026], 0.01, SLATE));
     }
-    let from = [0.0, 0.15];
-    let to = [0.17 * push, 0.15];
+    let [from, to] = [-0.085, 0.085].map(|x| [x * push, 0.145]);
     shapes.extend(Shape::arrow(from, to, 0.018, ORANGE));
     shapes
 }
