@@ -23,8 +23,9 @@ pub(crate) const EPSILON: f64 = 0.1;
 pub(crate) const LAKE_EPISODES: u32 = 1000;
 pub(crate) const CART_POLE_EPISODES: u32 = 1000;
 
-const LAKE: Limits = Limits { episodes: LAKE_EPISODES, max_steps: Some(200), n_terms: 0 };
-const CART_POLE: Limits = Limits { episodes: CART_POLE_EPISODES, max_steps: Some(500), n_terms: 0 };
+const LAKE: Limits = Limits { episodes: LAKE_EPISODES, max_steps: Some(200), ..Limits::EPISODE };
+const CART_POLE: Limits =
+    Limits { episodes: CART_POLE_EPISODES, max_steps: Some(500), ..Limits::EPISODE };
 
 type Learner<A> = fn(QTable, f64, Schedule, Schedule, Stream) -> A;
 

@@ -72,7 +72,7 @@ fn call_discretiser(bencher: Bencher) {
     let DiscretiserSpec::Cells { shape, cell } = &plan.variants[0].discretiser else {
         unreachable!("the script's discretiser is its own");
     };
-    let mut cells = host.callbacks().cells(cell, shape, &CartPole::new(false).schema());
+    let mut cells = host.callbacks().cells(cell, shape, &[], &CartPole::new(false).schema());
     bencher.bench_local(|| cells(black_box(&FIELDS)).expect("a cell"));
 }
 

@@ -84,7 +84,7 @@ fn describe(plan: &Plan) -> String {
 }
 
 fn rows(v: &Variant) -> Vec<(&'static str, String)> {
-    let kwargs: Vec<String> = v.kwargs.iter().map(|(k, x)| format!("{k}: {x}")).collect();
+    let kwargs: Vec<String> = v.config.kwargs.iter().map(|(k, x)| format!("{k}: {x}")).collect();
     let params: Vec<String> = v.agent.params.iter().map(|(k, x)| format!("{k}: {x}")).collect();
     let limit =
         v.max_steps.map_or("without a step limit".into(), |n| format!("of at most {n} steps"));
@@ -92,6 +92,9 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
         ("environment", format!("{} ({})", v.env.id, kwargs.join(", "))),
         ("agent", format!("{}({})", v.agent.spec.name, params.join(", "))),
     ];
+    for line in v.setting() {
+        rows.push(("setting", line));
+    }
     match &v.discretiser {
         DiscretiserSpec::StateIndex => {}
         DiscretiserSpec::Bins(dims) => {

@@ -20,7 +20,10 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let spec = env::find(&args.env)?;
+    let (spec, remark) = env::find_with_note(&args.env)?;
+    if let Some(remark) = remark {
+        note(&remark);
+    }
     let stem = args.name.strip_suffix(".rhai").unwrap_or(&args.name);
     let path = PathBuf::from(format!("{stem}.rhai"));
     let title = Path::new(stem).file_name().map(|n| n.to_string_lossy().into_owned());

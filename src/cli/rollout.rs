@@ -4,9 +4,10 @@ use std::io::Write;
 
 use clap::{Args as ClapArgs, ValueEnum};
 
+use super::output::note;
 use super::{Failure, Outcome};
-use crate::env::Session;
 use crate::env::rollout::{RolloutError, parse_actions, random_policy, rollout, rollout_actions};
+use crate::env::{Session, find_with_note};
 use crate::mdp::numpy::Seed;
 use crate::mdp::streams::Stream;
 
@@ -58,7 +59,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let seed: Seed =
         args.seed.parse().map_err(|e| Failure::Message(format!("--seed: {e}"), None))?;
-    let mut session = Session::new(&args.env, &kwargs)?;
+    let (spec, remark) = find_with_note(&args.env)?;
+    if let Some(remark) = remark {
+        note(&remark);
+    }
+    let mut session = Session::new(spec.id, &kwargs)?;
     let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
     let (Format::Jsonl, Policy::Random) = (args.format, args.policy);
     let played = if let Some(actions) = &args.actions {

@@ -7,14 +7,14 @@ use serde_json::{Map, Value};
 
 use super::actions::ActionTable;
 use super::error::EnvError;
-use super::registered::{Observation, Registered};
+use super::registered::{ActionMask, Observation, Registered};
 use super::registry::AnyEnv;
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{ActionSpace, Env, FiniteMdp, Schema, Step};
 
 /// An environment, seen through a vtable: for sessions, which are dynamic in every step.
 pub(super) trait Dynamic {
-    fn reset(&mut self, rng: &mut NumpyRng) -> Observation;
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Option<ActionMask>);
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
     fn step_box(&mut self, action: &[f32], rng: &mut NumpyRng) -> DynamicStep;
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
@@ -25,6 +25,7 @@ pub(super) trait Dynamic {
     fn action_space(&self) -> ActionSpace;
     fn schema(&self) -> Schema;
     fn finite(&self) -> Option<&Arc<FiniteMdp>>;
+    fn n_states(&self) -> Option<usize>;
 }
 
 /// What [`Dynamic::step`] returns.
@@ -34,21 +35,23 @@ pub(super) struct DynamicStep {
     pub(super) terminated: bool,
     /// The probability of the outcome, on finite environments.
     pub(super) probability: Option<f64>,
+    /// Which actions can do anything next, where Gymnasium says so.
+    pub(super) mask: Option<ActionMask>,
 }
 
 impl DynamicStep {
     fn new<E: Registered>(env: &E, step: Step<E::Obs>) -> Self {
-        let probability = Env::finite(env)
-            .zip(env.outcome_index(&step.obs))
-            .map(|(mdp, outcome)| mdp.outcomes()[outcome].probability);
+        let (probability, mask) = (env.probability(&step.obs), env.action_mask(&step.obs));
         let (reward, terminated) = (step.reward, step.terminated);
-        Self { obs: step.obs.into(), reward, terminated, probability }
+        Self { obs: step.obs.into(), reward, terminated, probability, mask }
     }
 }
 
 impl<E: Registered> Dynamic for E {
-    fn reset(&mut self, rng: &mut NumpyRng) -> Observation {
-        Env::reset(self, rng).into()
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Option<ActionMask>) {
+        let obs = Env::reset(self, rng);
+        let mask = self.action_mask(&obs);
+        (obs.into(), mask)
     }
 
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
@@ -92,6 +95,10 @@ impl<E: Registered> Dynamic for E {
     fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         Env::finite(self)
     }
+
+    fn n_states(&self) -> Option<usize> {
+        Env::n_states(self)
+    }
 }
 
 impl AnyEnv {
@@ -118,5 +125,10 @@ impl AnyEnv {
     /// Its model, if it has a finite one.
     pub fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         self.dynamic().finite()
+    }
+
+    /// Number of its states, if they are finite (with a model or without).
+    pub fn n_states(&self) -> Option<usize> {
+        self.dynamic().n_states()
     }
 }

@@ -20,7 +20,8 @@
 //! Terminated on entering `G` or `H`. Truncated after 100 steps (`FrozenLake8x8-v1`: 200).
 //!
 //! # Arguments
-//! - `desc` (null): the map, one string per row; goes before `map_name`
+//! - `desc` (null): the map, one string per row; goes before `map_name`. [`generate_random_map`]
+//!   draws one
 //! - `map_name` ("4x4"): "4x4" or "8x8"
 //! - `is_slippery` (true): whether a move may go astray to either side, at right angles
 //! - `success_rate` (1/3): the probability of the intended direction, if slippery; each side has
@@ -38,7 +39,11 @@
 //! 4. A `success_rate` outside [0, 1]: Gymnasium samples from what are no probabilities.
 //! 5. A `reward_schedule` that is not three finite numbers: Gymnasium ignores a fourth.
 
+mod random_map;
+
 use std::sync::Arc;
+
+pub use random_map::{MAX_TILES, generate_random_map, random_map_within};
 
 use super::error::EnvError;
 use super::kwargs::{KwargKind, KwargSpec, Kwargs};
@@ -257,13 +262,6 @@ impl Env for FrozenLake {
     fn schema(&self) -> Schema {
         let Map { rows, cols, tiles } = &*self.map;
         let (rows, cols) = (*rows, *cols);
-        let int = |name, doc, high: usize| Field {
-            name,
-            kind: FieldKind::Int,
-            doc,
-            low: 0.0,
-            high: high as f64,
-        };
         let mut facts =
             vec![("rows", FieldKind::Int, rows as f64), ("cols", FieldKind::Int, cols as f64)];
         if let Some(goal) = tiles.iter().position(|&tile| tile == b'G') {
@@ -273,9 +271,9 @@ impl Env for FrozenLake {
         let text = |row: &[u8]| row.iter().map(|&tile| char::from(tile)).collect();
         Schema {
             fields: vec![
-                int("row", "row, from 0 at the top", rows - 1),
-                int("col", "column, from 0 at the left", cols - 1),
-                int("index", "state index: row * cols + col", tiles.len() - 1),
+                Field::int("row", "row, from 0 at the top", 0, rows - 1),
+                Field::int("col", "column, from 0 at the left", 0, cols - 1),
+                Field::int("index", "state index: row * cols + col", 0, tiles.len() - 1),
                 Field {
                     name: "tile",
                     kind: FieldKind::Letter,

@@ -3,8 +3,8 @@
 //! - [`registry`]: [`specs`], [`find`], [`make`]: from an id and arguments to an [`AnyEnv`], and by
 //!   an [`EnvVisitor`] to static dispatch
 //! - [`cart_pole`], [`mountain_car`], [`mountain_car_continuous`], [`acrobot`], [`pendulum`],
-//!   [`lunar_lander`], [`frozen_lake`]: the dynamics, documented under Gymnasium's
-//!   headings
+//!   [`lunar_lander`], [`frozen_lake`], [`cliff_walking`], [`taxi`], [`blackjack`]: the dynamics,
+//!   documented under Gymnasium's headings
 //! - [`Registered`]: what an environment provides beyond its dynamics; [`KwargSpec`], [`Kwargs`]:
 //!   its constructor's arguments; [`EnvError`]: what can be wrong with them
 //! - [`ActionTable`]: real-valued actions for agents that choose among a few; [`PlayedAction`]: an
@@ -16,8 +16,10 @@
 pub mod acrobot;
 mod actions;
 mod any;
+pub mod blackjack;
 mod bounds;
 pub mod cart_pole;
+pub mod cliff_walking;
 mod config;
 mod error;
 pub mod frozen_lake;
@@ -31,11 +33,12 @@ mod registered;
 pub mod registry;
 pub mod rollout;
 mod session;
+pub mod taxi;
 
 pub use actions::{ActionTable, MAX_ACTIONS, PlayedAction};
 pub use config::EnvConfig;
 pub use error::EnvError;
 pub use kwargs::{KwargKind, KwargSpec, Kwargs};
-pub use registered::{Example, Observation, Registered};
-pub use registry::{AnyEnv, EnvSpec, EnvVisitor, find, make, specs};
+pub use registered::{ActionMask, Example, Observation, Registered};
+pub use registry::{AnyEnv, EnvSpec, EnvVisitor, find, find_with_note, make, specs};
 pub use session::{Session, SessionStep, time_limit};

@@ -1,6 +1,8 @@
 //! What an environment provides beyond its dynamics to stand in the registry.
 
-use serde::Serialize;
+use std::fmt;
+
+use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::actions::ActionTable;
@@ -9,7 +11,8 @@ use super::kwargs::{KwargSpec, Kwargs};
 use crate::mdp::{Env, FiniteState};
 
 /// An observation whose type is known at run time only. Serialises as Gymnasium's would: a bare
-/// integer, or a list of float32 in the shortest decimal that reads back as the same float32.
+/// integer, a list of float32 in the shortest decimal that reads back as the same float32, or a
+/// list of integers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Observation {
@@ -17,6 +20,8 @@ pub enum Observation {
     Index(i64),
     /// An array of float32 (`Box`).
     Box(Vec<f32>),
+    /// Several integers (`Tuple` of `Discrete`).
+    Tuple(Vec<i64>),
 }
 
 impl<const N: usize> From<[f32; N]> for Observation {
@@ -28,6 +33,24 @@ impl<const N: usize> From<[f32; N]> for Observation {
 impl From<FiniteState> for Observation {
     fn from(obs: FiniteState) -> Self {
         Self::Index(obs.index.into())
+    }
+}
+
+/// Which actions can do anything in a state, one flag per action: Gymnasium's
+/// `info["action_mask"]`. Displayed and serialised as one character per action, `1` for those that
+/// can: `110000`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ActionMask(pub Vec<bool>);
+
+impl fmt::Display for ActionMask {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|&can| f.write_str(if can { "1" } else { "0" }))
+    }
+}
+
+impl Serialize for ActionMask {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 
@@ -70,6 +93,18 @@ pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
     /// If an option's value is not allowed.
     fn set_reset_options(&mut self, _options: &Map<String, Value>) -> Result<(), EnvError> {
         Ok(())
+    }
+
+    /// The probability of the outcome that led to `obs`: Gymnasium's `info["prob"]`. `None` after a
+    /// reset and where there is no table of outcomes.
+    fn probability(&self, obs: &Self::Obs) -> Option<f64> {
+        let (mdp, outcome) = self.finite().zip(self.outcome_index(obs))?;
+        Some(mdp.outcomes()[outcome].probability)
+    }
+
+    /// Which actions can do anything after `obs`, in environments for which Gymnasium says so.
+    fn action_mask(&self, _obs: &Self::Obs) -> Option<ActionMask> {
+        None
     }
 
     /// Where actions are real numbers: the ones that agents choose among.

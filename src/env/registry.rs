@@ -6,7 +6,9 @@ use serde_json::{Map, Value};
 
 use super::acrobot::Acrobot;
 use super::any::Dynamic;
+use super::blackjack::Blackjack;
 use super::cart_pole::CartPole;
+use super::cliff_walking::CliffWalking;
 use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
@@ -15,6 +17,7 @@ use super::mountain_car::MountainCar;
 use super::mountain_car_continuous::MountainCarContinuous;
 use super::pendulum::Pendulum;
 use super::registered::{Example, Registered};
+use super::taxi::Taxi;
 use crate::mdp::Env;
 
 /// An environment's id and what Gymnasium registers with it.
@@ -147,7 +150,15 @@ environments! {
         ["LunarLanderContinuous-v3", Some(1000), Some(200.0), "continuous" = "true"];
     FrozenLake: ["FrozenLake-v1", Some(100), Some(0.7)],
         ["FrozenLake8x8-v1", Some(200), Some(0.85), "map_name" = "\"8x8\""];
+    CliffWalking: ["CliffWalking-v1", None, None],
+        ["CliffWalkingSlippery-v1", None, None, "is_slippery" = "true"];
+    Taxi: ["Taxi-v4", Some(200), Some(8.0)];
+    Blackjack: ["Blackjack-v1", None, None];
 }
+
+/// Old ids that are still understood: the id, its successor, and why that is the same.
+const ALIASES: &[(&str, &str, &str)] =
+    &[("Taxi-v3", "Taxi-v4", "a dry taxi without fickle passengers is the same in both")];
 
 /// Every registered environment.
 pub fn specs() -> &'static [EnvSpec] {
@@ -157,8 +168,8 @@ pub fn specs() -> &'static [EnvSpec] {
 /// Looks up an id; one without a version means the newest.
 ///
 /// # Errors
-/// If there is no such environment: with its successor if the version is an old one, else with
-/// the most similar id.
+/// If there is no such environment: with its successor if the version is an old one (`Taxi-v3` is
+/// understood), else with the most similar id.
 pub fn find(id: &str) -> Result<&'static EnvSpec, EnvError> {
     find_with_note(id).map(|(spec, _)| spec)
 }
@@ -170,6 +181,10 @@ pub fn find(id: &str) -> Result<&'static EnvSpec, EnvError> {
 pub fn find_with_note(id: &str) -> Result<(&'static EnvSpec, Option<String>), EnvError> {
     if let Some(spec) = SPECS.iter().find(|spec| spec.id == id) {
         return Ok((spec, None));
+    }
+    if let Some((old, new, why)) = ALIASES.iter().find(|(old, ..)| *old == id) {
+        let note = format!("Gymnasium 1.4 calls `{old}` `{new}`: {why}");
+        return find(new).map(|spec| (spec, Some(note)));
     }
     let (name, version) = split(id);
     let mut family: Vec<_> = SPECS.iter().filter(|spec| split(spec.id).0 == name).collect();
@@ -240,11 +255,25 @@ mod tests {
             note.as_deref(),
             Some("`CartPole` has no version: using the newest, `CartPole-v1`")
         );
+        let (spec, note) = find_with_note("Taxi-v3").unwrap();
+        assert_eq!(spec.id, "Taxi-v4");
+        assert!(note.unwrap().starts_with("Gymnasium 1.4 calls `Taxi-v3` `Taxi-v4`: "));
         for (id, message) in [
             (
                 "FrozenLake-v0",
                 "version v0 of the environment `FrozenLake` is out of date (use `FrozenLake-v1`)",
             ),
+            (
+                "CliffWalking-v0",
+                "version v0 of the environment `CliffWalking` is out of date (use \
+                 `CliffWalking-v1`)",
+            ),
+            (
+                "Blackjack-v0",
+                "version v0 of the environment `Blackjack` is out of date (use `Blackjack-v1`)",
+            ),
+            ("Taxi-v2", "version v2 of the environment `Taxi` is out of date (use `Taxi-v4`)"),
+            ("Taxi-v5", "there is no `Taxi-v5`; there is `Taxi-v4` (use `Taxi-v4`)"),
             (
                 "CartPole-v2",
                 "there is no `CartPole-v2`; there is `CartPole-v0`, `CartPole-v1` \

@@ -5,6 +5,9 @@
 //! {"type":"step","action":1,"obs":[…],"reward":1.0,"terminated":false,"truncated":false}
 //! ```
 //!
+//! Where Gymnasium gives an action mask, each line ends in it: `"mask":"110000"`, one character per
+//! action, `1` for those that can do anything next.
+//!
 //! After an episode has ended, the next action starts another one with an unseeded reset, whose
 //! line has `"seed":null`. Where actions are real numbers, `action` is a list.
 
@@ -15,7 +18,7 @@ use serde::Serialize;
 
 use super::actions::PlayedAction;
 use super::error::EnvError;
-use super::registered::Observation;
+use super::registered::{ActionMask, Observation};
 use super::session::{Session, SessionStep};
 use crate::mdp::ActionSpace;
 use crate::mdp::numpy::Seed;
@@ -75,12 +78,12 @@ pub fn rollout(
     out: &mut dyn Write,
 ) -> Result<(), RolloutError> {
     let mut obs = session.reset(Some(seed), None)?;
-    write_reset(out, Some(seed), &obs)?;
+    write_reset(out, Some(seed), &obs, session.action_mask())?;
     let mut ended = false;
     for i in 0..steps {
         if ended {
             obs = session.reset(None, None)?;
-            write_reset(out, None, &obs)?;
+            write_reset(out, None, &obs, session.action_mask())?;
         }
         let action = policy(&obs);
         let step = session.step(&action).map_err(|mut error| {
@@ -181,11 +184,17 @@ fn split_actions(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-fn write_reset(out: &mut dyn Write, seed: Option<&Seed>, obs: &Observation) -> io::Result<()> {
+fn write_reset(
+    out: &mut dyn Write,
+    seed: Option<&Seed>,
+    obs: &Observation,
+    mask: Option<&ActionMask>,
+) -> io::Result<()> {
     // A seed may be too large for any integer type: it is written as the digits it displays.
     let seed = seed.map_or_else(|| "null".to_owned(), Seed::to_string);
     let obs = serde_json::to_string(obs)?;
-    writeln!(out, r#"{{"type":"reset","seed":{seed},"obs":{obs}}}"#)
+    let mask = mask.map_or_else(String::new, |mask| format!(r#","mask":"{mask}""#));
+    writeln!(out, r#"{{"type":"reset","seed":{seed},"obs":{obs}{mask}}}"#)
 }
 
 #[cfg(test)]
@@ -222,6 +231,24 @@ mod tests {
             play("CartPole-v1", &json!({}), "0", "0"),
             r#"{"type":"reset","seed":0,"obs":[0.013696169,-0.02302133,-0.045902647,-0.048347235]}
 {"type":"step","action":0,"obs":[0.013235742,-0.21745604,-0.04686959,0.22950698],"reward":1.0,"terminated":false,"truncated":false}
+"#
+        );
+    }
+
+    #[test]
+    fn masks_and_tuples_are_written() {
+        // Gymnasium: the masks of states 314, 214 and 234.
+        assert_eq!(
+            play("Taxi-v4", &json!({}), "0", "1,2"),
+            r#"{"type":"reset","seed":0,"obs":314,"mask":"110000"}
+{"type":"step","action":1,"obs":214,"reward":-1.0,"terminated":false,"truncated":false,"mask":"111000"}
+{"type":"step","action":2,"obs":234,"reward":-1.0,"terminated":false,"truncated":false,"mask":"111100"}
+"#
+        );
+        assert_eq!(
+            play("Blackjack-v1", &json!({}), "0", "1"),
+            r#"{"type":"reset","seed":0,"obs":[11,10,0]}
+{"type":"step","action":1,"obs":[12,10,0],"reward":0.0,"terminated":false,"truncated":false}
 "#
         );
     }

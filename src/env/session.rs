@@ -16,7 +16,7 @@ use serde_json::{Map, Value};
 use super::actions::{ActionTable, PlayedAction, checked_box};
 use super::config::EnvConfig;
 use super::error::EnvError;
-use super::registered::Observation;
+use super::registered::{ActionMask, Observation};
 use super::registry::{AnyEnv, EnvSpec, find};
 use crate::mdp::numpy::{NumpyRng, Seed};
 use crate::mdp::{ActionSpace, Schema};
@@ -36,6 +36,9 @@ pub struct SessionStep {
     /// The probability of this outcome, on finite environments: Gymnasium's `info["prob"]`.
     #[serde(skip)]
     pub probability: Option<f64>,
+    /// Which actions can do anything next, in environments for which Gymnasium says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mask: Option<ActionMask>,
 }
 
 /// An environment, its random stream and its time limit.
@@ -50,6 +53,7 @@ pub struct Session {
     reset_options: Map<String, Value>,
     /// Steps since the last reset; `None` before the first one.
     elapsed: Option<u32>,
+    mask: Option<ActionMask>,
 }
 
 impl Session {
@@ -69,7 +73,7 @@ impl Session {
         let env = spec.build(config)?;
         let schema = env.schema();
         let (limit, reset_options) = (spec.max_steps, config.reset_options.clone());
-        Ok(Self { spec, env, schema, rng: None, limit, reset_options, elapsed: None })
+        Ok(Self { spec, env, schema, rng: None, limit, reset_options, elapsed: None, mask: None })
     }
 
     /// Replaces the time limit: -1 means none.
@@ -119,6 +123,12 @@ impl Session {
         self.limit
     }
 
+    /// Which actions can do anything in the present state, in environments for which Gymnasium
+    /// says so (after the first reset).
+    pub fn action_mask(&self) -> Option<&ActionMask> {
+        self.mask.as_ref()
+    }
+
     /// Sets an attribute, for example `CartPole`'s `kinematics_integrator`.
     ///
     /// # Errors
@@ -149,7 +159,8 @@ impl Session {
             (None, None) => return Err(EnvError::about("seed", "the first reset needs a seed")),
         };
         self.spec.set_reset_options(&mut self.env, options)?;
-        let obs = self.env.dynamic_mut().reset(&mut rng);
+        let (obs, mask) = self.env.dynamic_mut().reset(&mut rng);
+        self.mask = mask;
         self.rng = Some(rng);
         self.elapsed = Some(0);
         Ok(obs)
@@ -181,12 +192,14 @@ impl Session {
             }
         };
         *elapsed = elapsed.saturating_add(1);
+        self.mask.clone_from(&step.mask);
         Ok(SessionStep {
             obs: step.obs,
             reward: step.reward,
             terminated: step.terminated,
             truncated: self.limit.is_some_and(|limit| *elapsed >= limit),
             probability: step.probability,
+            mask: step.mask,
         })
     }
 }

@@ -39,12 +39,12 @@ pub(super) fn potential<E: Env + Clone + 'static>(
             let states = env.clone();
             let mut at = move |index: usize| {
                 let mut fields = [0.0; MAX_FIELDS];
-                let obs = states.state(index).expect("only finite environments index their states");
+                let obs = states.state(index).expect("StateIndex is given to finite states only");
                 states.fields(&obs, &mut fields);
                 phi(&fields[..n_fields])
             };
             // Reachable states at once, so that a mistake shows before training; the others, which
-            // may be junk, never.
+            // may be junk, never. Without a model nobody knows which those are.
             let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
             let mut table = vec![f64::NAN; n_cells];
             for (index, _) in reachable.iter().enumerate().filter(|(_, r)| **r) {
@@ -83,7 +83,8 @@ pub(super) fn reward<E: Env + Clone + 'static>(
     let callbacks = host.callbacks();
     let mut scripted =
         ScriptedReward::<E>(callbacks.reward(variant.reward.as_ref(), &terms, &schema));
-    if let Some(mdp) = env.finite() {
+    // Over several frames the last outcome alone does not determine the reward.
+    if let (Some(mdp), 1) = (env.finite(), variant.frame_skip) {
         callbacks.clear_step_read();
         let table = tabulate(env, mdp, terms.len(), &mut scripted)?;
         if !callbacks.step_read() {
@@ -197,6 +198,10 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
             })
         }
         AnyReward::Scripted(_) => return Err(NotAModel("t.step").fault(variant)),
+    };
+    let base = match variant.clip_reward {
+        Some([low, high]) => base.with_rewards(|_, _, o| o.reward.clamp(low, high)),
+        None => base,
     };
     let mut phi = vec![0.0; mdp.n_states()];
     let mut potential = potential(host, variant, env, mdp.n_states())?;

@@ -66,13 +66,10 @@ impl Audit {
 /// # Errors
 /// If a callback fails.
 pub fn audit_variant(host: &Host, variant: &Variant) -> Result<Audit, Diagnostic> {
-    if variant.potential.is_none() && variant.reward.is_none() && variant.terms.is_empty() {
+    if variant.potential.is_none() && !variant.changes_reward() {
         return Ok(Audit::new("unshaped", Some(true), "the agent learns from the native reward"));
     }
-    let env = variant
-        .env
-        .make(&variant.kwargs)
-        .map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+    let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     env.visit(Judge { host, variant })
 }
 
@@ -86,7 +83,7 @@ impl EnvVisitor for Judge<'_> {
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let (host, variant) = (self.host, self.variant);
-        let potential_only = variant.reward.is_none() && variant.terms.is_empty();
+        let potential_only = !variant.changes_reward();
         let DiscretiserSpec::StateIndex = variant.discretiser else {
             return Ok(match (potential_only, variant.potential_on) {
                 (true, PhiOn::Cell) => Audit::new(
@@ -98,7 +95,22 @@ impl EnvVisitor for Judge<'_> {
                     Audit::new("not checked", None, "Φ of the raw state is not constant on cells")
                 }
                 (false, _) => {
-                    Audit::new("not checked", None, "a scripted reward without a finite model")
+                    Audit::new("not checked", None, "a changed reward without a finite model")
+                }
+            });
+        };
+        let Some(plain) = env.finite().filter(|_| variant.frame_skip == 1) else {
+            return Ok(match (potential_only, variant.frame_skip) {
+                (true, _) => Audit::new(
+                    "potential-based",
+                    Some(true),
+                    "by construction: Φ is a function of the state",
+                ),
+                (false, 1) => {
+                    Audit::new("not checked", None, "a changed reward without a finite model")
+                }
+                (false, _) => {
+                    Audit::new("not checked", None, "a changed reward, summed over skipped frames")
                 }
             });
         };
@@ -113,7 +125,6 @@ impl EnvVisitor for Judge<'_> {
                 }
             },
         };
-        let plain = env.finite().expect("StateIndex is given to finite environments only");
         let gamma = variant.agent.float("gamma");
         let Ok(result) = preservation(plain, &model.shaped, gamma, &model.phi) else {
             return Ok(Audit::new(

@@ -46,8 +46,11 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
     let params: Vec<String> =
         variant.agent.params.iter().map(|(k, v)| format!("{k}: {v}")).collect();
     writeln!(out, "\nvariant {}", variant.name).expect(MEMORY);
-    writeln!(out, "  env {} {}", variant.env.id, serde_json::Value::Object(variant.kwargs.clone()))
-        .expect(MEMORY);
+    let kwargs = serde_json::Value::Object(variant.config.kwargs.clone());
+    writeln!(out, "  env {} {kwargs}", variant.env.id).expect(MEMORY);
+    for line in variant.setting() {
+        writeln!(out, "  {line}").expect(MEMORY);
+    }
     writeln!(out, "  agent {}({})", variant.agent.spec.name, params.join(", ")).expect(MEMORY);
     let audit = audit_variant(host, variant)?;
     exact(&audit, out);
@@ -119,10 +122,7 @@ fn look(variant: &Variant) -> Result<Look, Diagnostic> {
             env.schema()
         }
     }
-    let env = variant
-        .env
-        .make(&variant.kwargs)
-        .map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+    let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     Ok(Look { schema: env.visit(Ask) })
 }
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::record::EpisodeRow;
 use crate::learn::{Agent, Last};
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Ending, Env};
+use crate::mdp::{Ending, Env, Step};
 use crate::shaping::{Discretiser, Fault, Potential, RewardModel, Transition, potential_term};
 
 /// Everything an agent meets, seen through a discretiser and a reward model.
@@ -21,7 +21,7 @@ pub struct World<E, D, P, R> {
 }
 
 /// How much is played.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Number of episodes.
     pub episodes: u32,
@@ -29,6 +29,17 @@ pub struct Limits {
     pub max_steps: Option<u32>,
     /// Number of extra reward terms.
     pub n_terms: usize,
+    /// How many steps of the environment an action is repeated, 1 or more. `max_steps` counts the
+    /// environment's steps, an episode's own steps are the agent's.
+    pub frame_skip: u32,
+    /// The range to which the learned reward is clipped before the potential's part is added.
+    pub clip_reward: Option<[f64; 2]>,
+}
+
+impl Limits {
+    /// One episode without a time limit, and nothing out of the ordinary.
+    pub const EPISODE: Self =
+        Self { episodes: 1, max_steps: None, n_terms: 0, frame_skip: 1, clip_reward: None };
 }
 
 /// Why training ended early.
@@ -121,11 +132,21 @@ where
     let cell = discretiser.cell(env, &obs).map_err(|f| (Some(f), 0))?;
     let mut phi = potential.phi(env, cell, &obs).map_err(|f| (Some(f), 0))?;
     let mut action = agent.begin(cell);
-    let mut step = 0u32;
+    // Steps of the agent, and of the environment.
+    let (mut step, mut frames) = (0u32, 0u32);
     loop {
         let failed = |f| (Some(f), step);
-        let s = env.step(action, rng);
-        let truncated = !s.terminated && step + 1 >= max_steps;
+        let mut s = env.step(action, rng);
+        frames += 1;
+        for _ in 1..limits.frame_skip {
+            if s.terminated || frames >= max_steps {
+                break;
+            }
+            let more = env.step(action, rng);
+            frames += 1;
+            s = Step { reward: s.reward + more.reward, ..more };
+        }
+        let truncated = !s.terminated && frames >= max_steps;
         let next = discretiser.cell(env, &s.obs).map_err(failed)?;
         let t = Transition {
             state: &obs,
@@ -137,6 +158,9 @@ where
             step,
         };
         let mut r = reward.reward(env, &t, &mut terms).map_err(failed)?;
+        if let Some([low, high]) = limits.clip_reward {
+            r = r.clamp(low, high);
+        }
         if P::ACTIVE {
             let phi_next = if s.terminated || (truncated && !keep_truncated) {
                 0.0

@@ -101,7 +101,7 @@ pub fn run_unit(
     stop: &AtomicBool,
     each: &mut dyn FnMut(u32),
 ) -> Result<UnitRecord, UnitError> {
-    let env = variant.env.make(&variant.kwargs).map_err(|e| {
+    let env = variant.environment().map_err(|e| {
         UnitError::Script(Box::new(Diagnostic::error(e.message).maybe_hint(e.hint)))
     })?;
     env.visit(RunUnit { host, variant, seed, stop, each }).map_err(|e| match e {
@@ -124,7 +124,7 @@ impl EnvVisitor for RunUnit<'_> {
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         match &self.variant.discretiser {
             DiscretiserSpec::StateIndex => {
-                let n_states = env.finite().map_or(0, |mdp| mdp.n_states());
+                let n_states = env.n_states().unwrap_or(0);
                 self.with_discretiser(env, StateIndex { n_states })
             }
             DiscretiserSpec::Bins(dims) => {
@@ -133,7 +133,8 @@ impl EnvVisitor for RunUnit<'_> {
             }
             DiscretiserSpec::Cells { shape, cell } => {
                 let schema = env.schema();
-                let cell = self.host.callbacks().cells(cell, shape, &schema);
+                let cell =
+                    self.host.callbacks().cells(cell, shape, &self.variant.normalise, &schema);
                 let n_cells = shape.iter().product();
                 let cells = ScriptedCells::new(n_cells, schema.fields.len(), cell);
                 self.with_discretiser(env, cells)
@@ -207,6 +208,8 @@ where
             episodes: variant.episodes,
             max_steps: variant.max_steps,
             n_terms: variant.terms.len(),
+            frame_skip: variant.frame_skip,
+            clip_reward: variant.clip_reward,
         };
         let mut rng = NumpyRng::from_u64(seed);
         let mut rows: Vec<EpisodeRow> = Vec::with_capacity(limits.episodes as usize);

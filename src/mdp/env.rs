@@ -86,23 +86,30 @@ pub trait Env: Send {
         unreachable!("the actions of this environment are integers")
     }
 
-    /// The model, for environments that step a [`FiniteMdp`].
+    /// The exact model, if there is a finite one: for every state and action, the probability of
+    /// everything that [`Self::step`] may do.
     fn finite(&self) -> Option<&Arc<FiniteMdp>> {
         None
     }
 
-    /// The index of the state in [`Self::finite`]'s model; `None` on continuous environments.
+    /// Number of states, if they are finite. There may be finitely many states without a model:
+    /// where something that the observation does not show changes the dynamics.
+    fn n_states(&self) -> Option<usize> {
+        self.finite().map(|mdp| mdp.n_states())
+    }
+
+    /// The index of the state, below [`Self::n_states`]; `None` on continuous environments.
     fn state_index(&self, _obs: &Self::Obs) -> Option<usize> {
         None
     }
 
-    /// The observation of state `index` of [`Self::finite`]'s model, as after a reset.
+    /// The observation of state `index`, as after a reset; `None` on continuous environments.
     fn state(&self, _index: usize) -> Option<Self::Obs> {
         None
     }
 
-    /// Which outcome of [`Self::finite`]'s model led to `obs`; `None` after a reset and on
-    /// continuous environments.
+    /// Which outcome of [`Self::finite`]'s model led to `obs`; `None` after a reset and without a
+    /// model.
     fn outcome_index(&self, _obs: &Self::Obs) -> Option<usize> {
         None
     }
@@ -139,6 +146,13 @@ pub struct Field {
     pub low: f64,
     /// The largest value the observation space admits (may be infinite).
     pub high: f64,
+}
+
+impl Field {
+    /// An integer from `low` to `high`.
+    pub const fn int(name: &'static str, doc: &'static str, low: usize, high: usize) -> Self {
+        Self { name, kind: FieldKind::Int, doc, low: low as f64, high: high as f64 }
+    }
 }
 
 /// The fields of an environment's states, and the facts that are the same in all of them.

@@ -44,8 +44,43 @@ pub struct FiniteMdp {
     offsets: Vec<u32>,
     outcomes: Vec<Outcome>,
     initial: Vec<f64>,
+    starts: Starts,
     /// One per (s, a).
     draws: Vec<Draw>,
+}
+
+/// What it takes to draw an initial state: the states at which the largest running sum of the
+/// probabilities rises, with that sum. The first sum above a draw is at one of them.
+#[derive(Debug, Clone, PartialEq)]
+struct Starts {
+    /// Increasing, all above 0.
+    ceilings: Vec<f64>,
+    states: Vec<u32>,
+}
+
+impl Starts {
+    fn new(initial: &[f64]) -> Self {
+        let (mut ceilings, mut states) = (Vec::new(), Vec::new());
+        let (mut sum, mut ceiling) = (0.0, 0.0);
+        for (state, &probability) in initial.iter().enumerate() {
+            sum += probability;
+            // A sum that is no number is above nothing, and so are those after it.
+            if sum > ceiling {
+                ceiling = sum;
+                ceilings.push(ceiling);
+                states.push(state as u32);
+            }
+        }
+        Self { ceilings, states }
+    }
+
+    /// Draws a state, as [`categorical`] does over the probabilities.
+    #[inline]
+    fn draw(&self, rng: &mut NumpyRng) -> u32 {
+        let u = rng.random();
+        let passed = self.ceilings.partition_point(|&ceiling| ceiling <= u);
+        self.states.get(passed).copied().unwrap_or(0)
+    }
 }
 
 /// What it takes to draw an outcome of (s, a): half a cache line.
@@ -132,7 +167,8 @@ impl FiniteMdp {
                 offsets.push(outcomes.len() as u32);
             }
         }
-        Ok(Self { n_states, n_actions, offsets, outcomes, initial, draws })
+        let starts = Starts::new(&initial);
+        Ok(Self { n_states, n_actions, offsets, outcomes, initial, starts, draws })
     }
 
     /// Number of states.
@@ -264,8 +300,20 @@ impl FiniteEnv {
     /// Starts an episode: samples the initial distribution.
     #[inline]
     pub fn reset(&mut self, rng: &mut NumpyRng) -> FiniteState {
-        self.state = categorical(self.mdp.initial.iter().copied(), rng) as u32;
+        self.state = self.mdp.starts.draw(rng);
         FiniteState { index: self.state, outcome: FiniteState::START }
+    }
+
+    /// Moves to state `index` without an outcome, for dynamics that the table does not hold.
+    #[inline]
+    pub fn move_to(&mut self, index: u32) {
+        self.state = index;
+    }
+
+    /// The state it is in.
+    #[inline]
+    pub fn state(&self) -> u32 {
+        self.state
     }
 
     /// Samples an outcome of `action` and moves there. Returns it with the new state.
@@ -276,5 +324,56 @@ impl FiniteEnv {
         let outcome = &mdp.outcomes[i];
         self.state = outcome.next_state;
         (FiniteState { index: self.state, outcome: i as u32 }, outcome)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the fast draws must be equal to, on probabilities that are none as well.
+    const ODD: [&[f64]; 8] = [
+        &[1.0],
+        &[0.0, 0.25, 0.0, 0.5, 0.25],
+        &[0.3, -0.2, 0.4, 0.5],
+        &[0.1, 0.1],
+        &[0.2, f64::NAN, 0.8],
+        &[f64::NAN; 3],
+        &[0.0, 0.0],
+        &[0.9, 0.9, 0.9, 0.9],
+    ];
+
+    #[test]
+    fn initial_states_are_drawn_as_by_running_sums() {
+        let thirds = vec![1.0 / 300.0; 300];
+        for initial in ODD.into_iter().chain([&*thirds]) {
+            let starts = Starts::new(initial);
+            let (mut fast, mut plain) = (NumpyRng::from_u64(7), NumpyRng::from_u64(7));
+            for _ in 0..2_000 {
+                let expected = categorical(initial.iter().copied(), &mut plain);
+                assert_eq!(starts.draw(&mut fast) as usize, expected, "{initial:?}");
+            }
+            assert_eq!(fast, plain);
+        }
+    }
+
+    #[test]
+    fn outcomes_are_drawn_as_by_running_sums() {
+        let to = |(i, &probability): (usize, &f64)| Outcome {
+            probability,
+            next_state: i as u32,
+            reward: 0.0,
+            terminated: false,
+        };
+        for probabilities in ODD {
+            let outcomes: Vec<Outcome> = probabilities.iter().enumerate().map(to).collect();
+            let table = vec![vec![outcomes]; probabilities.len()];
+            let mdp = FiniteMdp::new(&table, vec![1.0; probabilities.len()]).unwrap();
+            let (mut fast, mut plain) = (NumpyRng::from_u64(7), NumpyRng::from_u64(7));
+            for _ in 0..2_000 {
+                let expected = categorical(probabilities.iter().copied(), &mut plain);
+                assert_eq!(mdp.draw(0, 0, &mut fast), expected, "{probabilities:?}");
+            }
+        }
     }
 }

@@ -1,6 +1,5 @@
 //! The functions with which a script builds its plan.
 
-use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, Map, NativeCallContext};
@@ -13,8 +12,11 @@ use super::draft::{
 use super::engine::Context;
 use super::params::{merge_agent, number, per_step, show, whole};
 use super::plan::GoldenBudget;
+use super::setting::Entries;
+use crate::env::frozen_lake::{MAX_TILES, random_map_within};
 use crate::learn::registry::{AGENTS, AgentSpec};
 use crate::learn::{AgentConfig, Schedule, Unit};
+use crate::mdp::numpy::Seed;
 use crate::shaping::MAX_CELLS;
 
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
@@ -198,18 +200,44 @@ pub(super) fn experiments_of(list: &Array) -> Result<Vec<ExperimentDraft>, Diagn
 }
 
 fn environments(engine: &mut Engine, context: &Rc<Context>) {
-    let new = |id: &str| EnvDraft {
-        id: id.to_string(),
-        kwargs: serde_json::Map::new(),
-        kwarg_spots: BTreeMap::new(),
-    };
+    let new = |id: &str| EnvDraft { id: id.to_string(), kwargs: Entries::default() };
     engine.register_fn("env", move |id: &str| new(id));
     let c = context.clone();
     engine.register_fn("env", move |native: NativeCallContext, id: &str, kwargs: Map| {
         let call = Call::new(&c, &native);
         let mut draft = new(id);
-        call.finish(draft.merge(&kwargs, |key| call.key(key)).map(|()| draft))
+        call.finish(draft.kwargs.merge(&kwargs, |key| call.key(key)).map(|()| draft))
     });
+    let c = context.clone();
+    engine.register_fn(
+        "generate_random_map",
+        move |native: NativeCallContext, size: Dynamic, p: Dynamic, seed: Dynamic| {
+            let call = Call::new(&c, &native);
+            call.finish(random_map(&call, &size, &p, &seed))
+        },
+    );
+}
+
+fn random_map(
+    call: &Call<'_>,
+    size: &Dynamic,
+    p: &Dynamic,
+    seed: &Dynamic,
+) -> Result<Array, Diagnostic> {
+    let at = |i: usize| move |d: Diagnostic| d.at(call.arg(i).place());
+    let size = whole("the size of a random map", size, 2, 100).map_err(at(0))? as usize;
+    let p = number(p).ok_or_else(|| {
+        at(1)(Diagnostic::error(format!("the p of a random map is a number, got {}", show(p))))
+    })?;
+    let seed = whole("the seed of a random map", seed, 0, i64::MAX).map_err(at(2))? as u64;
+    // Tiles are work like any other that the script has done.
+    let Context { operations, max_operations, .. } = call.context;
+    let budget = max_operations.get().saturating_sub(operations.get()).min(MAX_TILES);
+    let mut left = budget;
+    let map = random_map_within(size, p, &Seed::from(seed), &mut left);
+    operations.set(operations.get() + budget - left);
+    let rows = map.map_err(|e| at(1)(Diagnostic::error(e.message).maybe_hint(e.hint)))?;
+    Ok(rows.into_iter().map(Dynamic::from).collect())
 }
 
 fn agent(engine: &mut Engine, context: &Rc<Context>, spec: &'static AgentSpec) {

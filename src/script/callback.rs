@@ -13,7 +13,7 @@ use super::plan::Callback;
 use super::record;
 use super::state::{State, StepView};
 use crate::mdp::{Env, Schema};
-use crate::shaping::{CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn};
+use crate::shaping::{CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn, Scale};
 
 fn fault(diagnostic: Diagnostic) -> Fault {
     Fault(Box::new(diagnostic))
@@ -124,13 +124,24 @@ impl Callbacks {
         })
     }
 
-    /// `callback` as a discretiser into a table of the given shape.
-    pub fn cells(self: &Rc<Self>, callback: &Callback, shape: &[usize], schema: &Schema) -> CellFn {
+    /// `callback` as a discretiser into a table of the given shape; it sees the fields that
+    /// `scales` speak of normalised.
+    pub fn cells(
+        self: &Rc<Self>,
+        callback: &Callback,
+        shape: &[usize],
+        scales: &[Scale],
+        schema: &Schema,
+    ) -> CellFn {
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
-        let shape = shape.to_vec();
+        let (shape, scales) = (shape.to_vec(), scales.to_vec());
         Box::new(move |fields| {
-            let state = State::new(&schema, fields);
+            let mut shown = [0.0; MAX_FIELDS];
+            let shown = &mut shown[..fields.len()];
+            shown.copy_from_slice(fields);
+            Scale::show_all(&scales, shown);
+            let state = State::new(&schema, shown);
             let result = host.call(&callback, Dynamic::from(state.clone()));
             result
                 .and_then(|value| {
@@ -186,6 +197,24 @@ impl Callbacks {
                 total += term;
             }
             Ok(total)
+        })
+    }
+
+    /// The numbers of real-valued action `index`.
+    pub(super) fn action(&self, callback: &Callback, index: usize) -> Result<Vec<f64>, Diagnostic> {
+        let value = self.call(&self.prepare(callback), Dynamic::from(index as i64))?;
+        let numbers = match value.read_lock::<rhai::Array>() {
+            Some(list) => list.iter().map(super::params::number).collect(),
+            None => super::params::number(&value).map(|x| vec![x]),
+        };
+        numbers.ok_or_else(|| {
+            let d = Diagnostic::error(format!(
+                "the action {} must return a number or an array of numbers, it returned {} for \
+                 action {index}",
+                callback.described(),
+                show(&value)
+            ));
+            self.annotate(d.at(callback.place.clone()))
         })
     }
 

@@ -8,8 +8,9 @@ use rhai::{Dynamic, FnPtr, Map};
 
 use super::diagnostic::{Diagnostic, Place, suggest};
 use super::keys;
-use super::params::{json, merge_agent, number, show, text, whole};
+use super::params::{merge_agent, number, show, text, whole};
 use super::plan::GoldenBudget;
+use super::setting::{Entries, SettingDraft};
 use super::value::MAX_DEPTH;
 use crate::learn::ParamValue;
 use crate::learn::registry::AgentSpec;
@@ -42,8 +43,7 @@ pub(super) struct AgentDraft {
 #[derive(Debug, Clone)]
 pub(super) struct EnvDraft {
     pub(super) id: String,
-    pub(super) kwargs: serde_json::Map<String, serde_json::Value>,
-    pub(super) kwarg_spots: BTreeMap<String, Spot>,
+    pub(super) kwargs: Entries,
 }
 
 /// One `[lo, hi, n]`.
@@ -77,6 +77,7 @@ pub(super) struct ExperimentDraft {
     pub(super) max_steps: Option<u32>,
     pub(super) threshold: Option<f64>,
     pub(super) window: Option<u32>,
+    pub(super) setting: SettingDraft,
     pub(super) potential: Option<Located<FnPtr>>,
     pub(super) potential_raw: bool,
     pub(super) reward: Option<Located<FnPtr>>,
@@ -96,7 +97,7 @@ pub(super) struct StudyDraft {
     pub(super) golden: GoldenBudget,
 }
 
-fn wrong(key: &str, expected: &str, value: &Dynamic) -> Diagnostic {
+pub(super) fn wrong(key: &str, expected: &str, value: &Dynamic) -> Diagnostic {
     Diagnostic::error(format!("`{key}` is {expected}, got {}", show(value)))
 }
 
@@ -206,6 +207,7 @@ impl ExperimentDraft {
             "notes" => {
                 self.notes = Some(text(value).ok_or_else(|| wrong(key, "a string", value))?);
             }
+            key if SettingDraft::knows(key) => self.setting.set(key, value, spot)?,
             unknown => {
                 return Err(Diagnostic::error(format!("an experiment has no key `{unknown}`"))
                     .maybe_hint(suggest(unknown, keys::names())));
@@ -223,13 +225,12 @@ impl ExperimentDraft {
 
     fn set_env(&mut self, value: &Dynamic, spot: &dyn Fn(&str) -> Spot) -> Result<(), Diagnostic> {
         if let Some(id) = text(value) {
-            let value =
-                EnvDraft { id, kwargs: serde_json::Map::new(), kwarg_spots: BTreeMap::new() };
+            let value = EnvDraft { id, kwargs: Entries::default() };
             self.env = Some(Located { value, spot: spot("env") });
         } else if let Some(draft) = value.clone().flatten().try_cast::<EnvDraft>() {
             self.env = Some(Located { value: draft, spot: spot("env") });
         } else if let (Some(map), Some(env)) = (value.read_lock::<Map>(), self.env.as_mut()) {
-            env.value.merge(&map, |key| spot(&format!("env.{key}")))?;
+            env.value.kwargs.merge(&map, |key| spot(&format!("env.{key}")))?;
         } else {
             return Err(wrong("env", "an environment's id or env(id, #{..})", value));
         }
@@ -305,29 +306,6 @@ pub(super) fn is_name(name: &str) -> bool {
         && name != "."
         && name != ".."
         && !name.chars().any(|c| c.is_control() || c == '/' || c == '\\')
-}
-
-impl EnvDraft {
-    /// Merges constructor arguments; `()` removes one.
-    pub(super) fn merge(
-        &mut self,
-        map: &Map,
-        spot: impl Fn(&str) -> Spot,
-    ) -> Result<(), Diagnostic> {
-        for (key, value) in map {
-            let place = spot(key);
-            if value.is_unit() {
-                self.kwargs.remove(key.as_str());
-                continue;
-            }
-            let value = json(value).map_err(|what| {
-                Diagnostic::error(format!("`{key}` cannot be {what}")).at(place.place())
-            })?;
-            self.kwargs.insert(key.to_string(), value);
-            self.kwarg_spots.insert(key.to_string(), place);
-        }
-        Ok(())
-    }
 }
 
 /// `20` → 0..20; `[3, 5]` → 3, 5.

@@ -36,6 +36,11 @@ const BUILDERS: &[(&str, &str, &str)] = &[
     ("notes", "study.notes(text)", "the rationale, carried into the manifest"),
     ("env", "env(id, #{kwargs})", "an environment with Gymnasium's constructor arguments"),
     (
+        "generate_random_map",
+        "generate_random_map(size, p, seed)",
+        "Gymnasium's random map for FrozenLake's `desc`: tiles are ice with probability p",
+    ),
+    (
         "bins",
         "bins(#{ field: [lo, hi, n], .. }) or bins([[lo, hi, n], ..])",
         "uniform bins: NumPy's linspace and digitize, clamped; fields left out are ignored",

@@ -23,10 +23,12 @@ mod plan;
 mod record;
 mod resolve;
 mod sandbox;
+mod setting;
 mod source;
 mod state;
 mod syntax;
 mod value;
+mod world;
 
 pub use callback::Callbacks;
 pub use diagnostic::{Diagnostic, Place, Severity};

@@ -8,9 +8,9 @@ use serde_json::{Map, Value as Json};
 use super::diagnostic::{Diagnostic, Place};
 use super::source::SourceSet;
 use super::value::Value;
-use crate::env::EnvSpec;
+use crate::env::{AnyEnv, EnvConfig, EnvError, EnvSpec};
 use crate::learn::AgentConfig;
-use crate::shaping::Dim;
+use crate::shaping::{Dim, Scale};
 
 /// A script function that the host calls while training.
 #[derive(Debug, Clone)]
@@ -75,8 +75,15 @@ pub struct Variant {
     pub place: Option<Place>,
     /// The environment.
     pub env: &'static EnvSpec,
-    /// Its constructor's arguments, defaults filled in.
-    pub kwargs: Map<String, Json>,
+    /// How it is set up: its constructor's arguments (defaults filled in), attributes, reset
+    /// options and real-valued actions.
+    pub config: EnvConfig,
+    /// How many steps of the environment an action is repeated.
+    pub frame_skip: u32,
+    /// The range to which the learned reward is clipped, before the potential's part is added.
+    pub clip_reward: Option<[f64; 2]>,
+    /// Ranges that scripted cells see as [-1, 1] (the edges of bins are in physical units already).
+    pub normalise: Vec<Scale>,
     /// The agent.
     pub agent: AgentConfig,
     /// State → cell.
@@ -104,6 +111,45 @@ pub struct Variant {
 }
 
 impl Variant {
+    /// A new instance of its environment.
+    ///
+    /// # Errors
+    /// Never for a resolved variant: its configuration has been built once.
+    pub fn environment(&self) -> Result<AnyEnv, EnvError> {
+        self.env.build(&self.config)
+    }
+
+    /// What was changed in the environment's setting beyond its constructor's arguments, one line
+    /// each.
+    pub fn setting(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let entries = [
+            ("attributes", &self.config.attributes),
+            ("reset_options", &self.config.reset_options),
+        ];
+        for (name, map) in entries {
+            if !map.is_empty() {
+                let list: Vec<_> = map.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+                lines.push(format!("{name} {}", list.join(", ")));
+            }
+        }
+        if let Some(actions) = &self.config.actions {
+            lines.push(format!("actions {actions:?}"));
+        }
+        if self.frame_skip > 1 {
+            lines.push(format!("frame_skip {}", self.frame_skip));
+        }
+        if let Some(range) = self.clip_reward {
+            lines.push(format!("clip_reward {range:?}"));
+        }
+        lines
+    }
+
+    /// Whether the agent learns from anything but the native reward and a potential.
+    pub fn changes_reward(&self) -> bool {
+        self.reward.is_some() || !self.terms.is_empty() || self.clip_reward.is_some()
+    }
+
     /// Everything that can change a result of this variant, except the seed.
     pub fn identity(&self) -> Json {
         let digest = |c: &Callback| Json::from(c.digest.as_str());
@@ -123,7 +169,13 @@ impl Variant {
             self.terms.iter().map(|(k, c)| (k.clone(), digest(c))).collect();
         serde_json::json!({
             "env": self.env.id,
-            "kwargs": self.kwargs,
+            "kwargs": self.config.kwargs,
+            "attributes": self.config.attributes,
+            "reset_options": self.config.reset_options,
+            "actions": self.config.actions,
+            "frame_skip": self.frame_skip,
+            "clip_reward": self.clip_reward,
+            "normalise": self.normalise,
             "agent": self.agent.spec.name,
             "params": params,
             "discretiser": discretiser,

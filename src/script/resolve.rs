@@ -9,14 +9,14 @@ use sha2::{Digest, Sha256};
 
 use super::callback::Callbacks;
 use super::diagnostic::{Diagnostic, suggest};
-use super::draft::{BinDraft, DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
+use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
 use super::plan::{Callback, DiscretiserSpec, Expectation, PhiOn, Plan, SeedList, Variant};
 use super::source::{hex, tokens};
 use super::value::Value;
-use crate::env::{self, AnyEnv, EnvError, EnvSpec};
+use super::world::{clipping_warning, dims, example_bins};
+use crate::env::{AnyEnv, EnvSpec};
 use crate::learn::AgentConfig;
-use crate::mdp::Schema;
-use crate::shaping::{Bins, Dim};
+use crate::shaping::{Dim, Scale};
 
 const EPISODES: u32 = 500;
 const SEEDS: u64 = 20;
@@ -79,8 +79,9 @@ pub(super) fn plan(
     })
 }
 
-struct Resolver<'a> {
-    host: &'a Rc<Callbacks>,
+/// Resolves one study's experiments.
+pub(super) struct Resolver<'a> {
+    pub(super) host: &'a Rc<Callbacks>,
     constants: &'a BTreeMap<String, Value>,
 }
 
@@ -98,16 +99,23 @@ impl Resolver<'_> {
         let agent = draft.agent.as_ref().ok_or_else(|| {
             missing("agent", "add, for example, `agent: q_learning(#{ alpha: 0.1 })`")
         })?;
-        let (spec, any) = environment(draft)?
+        let (spec, config, any) = self
+            .environment(draft, warnings)?
             .ok_or_else(|| missing("env", "add, for example, `env: \"CartPole-v1\"`"))?;
-        let kwargs = draft.env.as_ref().map(|e| e.value.kwargs.clone()).unwrap_or_default();
-        let kwargs = spec.resolve_kwargs(&kwargs).map_err(|e| env_error(draft, e))?;
         let agent = Located {
             value: AgentConfig { spec: agent.value.spec, params: agent.value.params.clone() },
             spot: agent.spot.clone(),
         };
         let schema = any.schema();
-        let discretiser = self.discretiser(draft, &agent, spec, &any, &schema)?;
+        let setting = &draft.setting;
+        let normalise = match &setting.normalise {
+            Some(n) => n.value.scales(&schema, spec, &n.spot)?,
+            None => Vec::new(),
+        };
+        let discretiser = self.discretiser(draft, &agent, spec, &any, &normalise)?;
+        if let Some(clip) = &setting.clip_reward {
+            warnings.push(clipping_warning(clip));
+        }
         let potential = self.optional(draft.potential.as_ref(), "(s) -> number")?;
         if potential.is_some()
             && draft.potential_raw
@@ -143,7 +151,10 @@ impl Resolver<'_> {
                 .map_or(agent.value.spec.name.to_string(), |n| n.value.clone()),
             place: draft.spot.place(),
             env: spec,
-            kwargs,
+            config,
+            frame_skip: setting.frame_skip.unwrap_or(1),
+            clip_reward: setting.clip_reward.as_ref().map(|c| c.value),
+            normalise,
             agent: agent.value,
             discretiser,
             episodes: draft.episodes.unwrap_or(EPISODES),
@@ -165,24 +176,35 @@ impl Resolver<'_> {
         agent: &Located<AgentConfig>,
         spec: &EnvSpec,
         env: &AnyEnv,
-        schema: &Schema,
+        normalise: &[Scale],
     ) -> Result<DiscretiserSpec, Diagnostic> {
-        let finite = env.finite().is_some();
-        if agent.value.is_planner() && (!finite || draft.discretiser.is_some()) {
-            let why = if finite { "it plans on the states themselves" } else { "it has none" };
+        let has_model = env.finite().is_some();
+        if agent.value.is_planner() && draft.setting.frame_skip.is_some_and(|n| n > 1) {
+            return Err(Diagnostic::error(format!(
+                "`{}` plans on the model of single steps: leave out `frame_skip`",
+                agent.value.spec.name
+            ))
+            .at(agent.spot.place()));
+        }
+        if agent.value.is_planner() && (!has_model || draft.discretiser.is_some()) {
+            let why = match (has_model, env.n_states()) {
+                (true, _) => "it plans on the states themselves",
+                (false, None) => "it has none",
+                (false, Some(_)) => "with these arguments it has none",
+            };
             return Err(Diagnostic::error(format!(
                 "`{}` needs the finite model of {}: {why}",
                 agent.value.spec.name, spec.id
             ))
             .at(agent.spot.place())
-            .hint(if finite {
+            .hint(if has_model {
                 "leave out the discretiser"
             } else {
                 "q_learning or sarsa learn without a model"
             }));
         }
         match draft.discretiser.as_ref() {
-            None if finite => Ok(DiscretiserSpec::StateIndex),
+            None if env.n_states().is_some() => Ok(DiscretiserSpec::StateIndex),
             // It does not look at states.
             None if agent.value.spec.name == "random_agent" => {
                 Ok(DiscretiserSpec::Bins(vec![Dim { field: 0, lo: 0.0, hi: 1.0, n: 1 }]))
@@ -194,7 +216,7 @@ impl Resolver<'_> {
             .at(agent.spot.place())
             .hint(format!("add, for example, `discretiser: {}`", example_bins(spec)))),
             Some(d) => match &d.value {
-                DiscretiserDraft::Bins(bins) => dims(bins, schema, spec)
+                DiscretiserDraft::Bins(bins) => dims(bins, &env.schema(), normalise, spec)
                     .map(DiscretiserSpec::Bins)
                     .map_err(|e| e.at(d.spot.place())),
                 DiscretiserDraft::Cells { shape, cell } => {
@@ -215,7 +237,7 @@ impl Resolver<'_> {
     }
 
     /// Freezes a function pointer: what it captured becomes plain data, its source is hashed.
-    fn callback(
+    pub(super) fn callback(
         &self,
         f: &Located<FnPtr>,
         signature: &str,
@@ -343,54 +365,4 @@ impl Resolver<'_> {
 /// The identifiers inside a token (a word is one; a backtick string may hold several).
 fn words(token: &str) -> impl Iterator<Item = &str> {
     token.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty())
-}
-
-fn environment(draft: &ExperimentDraft) -> Result<Option<(&'static EnvSpec, AnyEnv)>, Diagnostic> {
-    let Some(env) = &draft.env else { return Ok(None) };
-    let spec = env::find(&env.value.id).map_err(|e| env_error(draft, e))?;
-    let any = spec.make(&env.value.kwargs).map_err(|e| env_error(draft, e))?;
-    Ok(Some((spec, any)))
-}
-
-fn env_error(draft: &ExperimentDraft, error: EnvError) -> Diagnostic {
-    let env = draft.env.as_ref();
-    let place = env.and_then(|env| {
-        let key = error.key.as_ref().and_then(|key| env.value.kwarg_spots.get(key));
-        key.and_then(super::draft::Spot::place).or_else(|| env.spot.place())
-    });
-    Diagnostic::error(error.message).at(place).maybe_hint(error.hint)
-}
-
-fn dims(bins: &[BinDraft], schema: &Schema, spec: &EnvSpec) -> Result<Vec<Dim>, Diagnostic> {
-    let mut dims = Vec::with_capacity(bins.len());
-    for bin in bins {
-        let field = match &bin.field {
-            Ok(name) => schema.fields.iter().position(|f| f.name == name).ok_or_else(|| {
-                let names: Vec<&str> = schema.fields.iter().map(|f| f.name).collect();
-                Diagnostic::error(format!("the state of {} has no field `{name}`", spec.id))
-                    .at(bin.spot.place())
-                    .maybe_hint(suggest(name, names))
-            })?,
-            Err(i) if *i < schema.fields.len() => *i,
-            Err(i) => {
-                return Err(Diagnostic::error(format!(
-                    "bin number {} is one too many: the state of {} has {} fields",
-                    i + 1,
-                    spec.id,
-                    schema.fields.len()
-                ))
-                .at(bin.spot.place()));
-            }
-        };
-        dims.push(Dim { field, lo: bin.lo, hi: bin.hi, n: bin.n });
-    }
-    // In the order of the state's fields, whichever way they were written.
-    dims.sort_by_key(|d| d.field);
-    Bins::new(&dims).map_err(|e| Diagnostic::error(e.message))?;
-    Ok(dims)
-}
-
-/// Bins to suggest.
-fn example_bins(spec: &EnvSpec) -> String {
-    format!("bins(#{{ {} }})", spec.example.bins)
 }

@@ -18,7 +18,7 @@ pub trait Discretiser<E: Env> {
 /// The identity, for environments whose observations are state indices.
 #[derive(Debug, Clone, Copy)]
 pub struct StateIndex {
-    /// Number of states of the environment's model.
+    /// Number of states of the environment.
     pub n_states: usize,
 }
 
@@ -29,7 +29,7 @@ impl<E: Env> Discretiser<E> for StateIndex {
 
     #[inline]
     fn cell(&mut self, env: &E, obs: &E::Obs) -> Result<usize, Fault> {
-        Ok(env.state_index(obs).expect("StateIndex is only built for finite environments"))
+        Ok(env.state_index(obs).expect("StateIndex is given to finite states only"))
     }
 }
 

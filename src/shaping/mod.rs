@@ -2,6 +2,7 @@
 //!
 //! - [`Discretiser`]: observation → cell. [`StateIndex`], [`Bins`], [`ScriptedCells`]
 //! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`RawPotential`]
+//! - [`Scale`]: observation normalisation
 //! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
 //!   [`ScriptedReward`]
 //! - [`potential_term`]: `γΦ(s′) − Φ(s)`, with Φ(terminal) = 0, in the one place where it is computed
@@ -14,6 +15,7 @@ mod bins;
 mod discretiser;
 mod potential;
 mod reward;
+mod scale;
 
 pub use bins::{Bins, BinsError, Dim, MAX_CELLS};
 pub use discretiser::{CellFn, Discretiser, ScriptedCells, StateIndex};
@@ -24,6 +26,7 @@ pub use potential::{
 pub use reward::{
     AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,
 };
+pub use scale::Scale;
 
 /// The largest number of fields a state may have: lets the step use a buffer on the stack.
 pub const MAX_FIELDS: usize = 16;

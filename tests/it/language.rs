@@ -25,7 +25,7 @@ pub(crate) fn potential(variant: &Variant) -> &Callback {
 fn phi_at(plan: &Plan, variant: usize, row: u8, col: u8) -> f64 {
     let variant = &plan.variants[variant];
     let host = Host::open(plan).unwrap();
-    let schema = variant.env.make(&variant.kwargs).unwrap().schema();
+    let schema = variant.environment().unwrap().schema();
     let mut phi = host.callbacks().potential(potential(variant), &schema);
     let (row, col) = (f64::from(row), f64::from(col));
     let first =
@@ -146,11 +146,11 @@ fn with_merges_deeply_and_unit_removes() {
     );
     let [base, other] = plan.variants.as_slice() else { panic!() };
     assert_eq!(
-        (&base.kwargs["map_name"], &base.kwargs["is_slippery"]),
+        (&base.config.kwargs["map_name"], &base.config.kwargs["is_slippery"]),
         (&"8x8".into(), &false.into())
     );
     assert_eq!(
-        (&other.kwargs["map_name"], &other.kwargs["is_slippery"]),
+        (&other.config.kwargs["map_name"], &other.config.kwargs["is_slippery"]),
         (&"4x4".into(), &true.into())
     );
     assert_eq!((other.agent.float("gamma"), base.agent.float("gamma")), (0.9, 0.9));
@@ -186,8 +186,8 @@ fn schedules_and_discretisers_as_written() {
     for (i, expected) in [(2, 4), (3, 5)] {
         let variant = &plan.variants[i];
         let DiscretiserSpec::Cells { shape, cell } = &variant.discretiser else { panic!() };
-        let schema = variant.env.make(&variant.kwargs).unwrap().schema();
-        let mut cells = host.callbacks().cells(cell, shape, &schema);
+        let schema = variant.environment().unwrap().schema();
+        let mut cells = host.callbacks().cells(cell, shape, &[], &schema);
         assert_eq!(cells(&[0.0, 0.0]).unwrap(), expected);
     }
 }

@@ -1,5 +1,6 @@
 //! Integration tests: one binary, one module a subject.
 
+mod blackjack;
 mod cli;
 mod crash;
 mod env;
@@ -11,7 +12,9 @@ mod numbers;
 mod parity;
 mod readme;
 mod scripts;
+mod setting;
 mod shaping;
 mod support;
+mod toy_text;
 mod unreadable;
 mod wiewiora;

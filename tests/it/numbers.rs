@@ -121,7 +121,7 @@ fn integers_are_checked() {
         let plan = plan_of(&format!("fn f(s) {{ {body} }} {LAKE}"), &[]);
         let variant = &plan.variants[0];
         let host = Host::open(&plan).unwrap();
-        let schema = variant.env.make(&variant.kwargs).unwrap().schema();
+        let schema = variant.environment().unwrap().schema();
         let mut phi = host.callbacks().potential(potential(variant), &schema);
         assert!(phi(&[0.0; 4]).is_err(), "{body}");
     }

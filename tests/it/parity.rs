@@ -5,8 +5,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
+use runner::env::frozen_lake::generate_random_map;
 use runner::env::recording::{ParityReport, Tolerance, replay, replay_file, tolerance};
-use runner::env::{make, specs};
+use runner::env::taxi::TaxiState;
+use runner::env::{ActionMask, make, specs};
 use runner::mdp::{ActionSpace, Outcome, Schema};
 use serde_json::{Map, Value, json};
 
@@ -164,6 +166,10 @@ fn malformed_recordings_name_the_line() {
             "line 2: the observation at step 0 has not the shape of FrozenLake-v1's, which is an \
              integer",
         ),
+        (
+            good.replace("\"prob\":1.0", "\"mask\":\"1111\""),
+            "line 2: the mask at step 1 must be 0 characters 0 or 1, not `1111`",
+        ),
         (format!("{good}{{\n"), "line 3: not an episode: EOF while parsing"),
     ] {
         let error = replay(text.as_bytes()).unwrap_err().to_string();
@@ -185,15 +191,17 @@ fn gzip_is_recognised_by_content_and_damage_is_an_error() {
     assert!(error.contains("cannot be read: "), "{error}");
 }
 
-fn frozen_lake_tables() -> Vec<Value> {
-    let file = std::fs::File::open(folder().join("frozenlake_tables.json.gz")).unwrap();
+fn gzipped(name: &str) -> Value {
+    let file = std::fs::File::open(folder().join(name)).unwrap();
     serde_json::from_reader(GzDecoder::new(file)).unwrap()
 }
 
 #[test]
-fn frozen_lake_tables_are_gymnasiums() {
-    let tables = frozen_lake_tables();
-    assert_eq!(tables.len(), 7);
+fn tables_are_gymnasiums() {
+    let files = ["frozenlake_tables.json.gz", "cliff_taxi_tables.json.gz"];
+    let tables: Vec<Value> =
+        files.iter().flat_map(|name| gzipped(name).as_array().unwrap().clone()).collect();
+    assert_eq!(tables.len(), 7 + 5);
     for table in tables {
         let kwargs = table["kwargs"].as_object().unwrap();
         let env = make(table["env_id"].as_str().unwrap(), kwargs).unwrap();
@@ -221,6 +229,39 @@ fn frozen_lake_tables_are_gymnasiums() {
 }
 
 #[test]
+fn every_taxi_mask_is_gymnasiums() {
+    let masks: Vec<String> =
+        serde_json::from_value(gzipped("taxi_masks.json.gz")["mask"].take()).unwrap();
+    assert_eq!(masks.len(), 500);
+    for (s, mask) in masks.iter().enumerate() {
+        assert_eq!(
+            ActionMask(TaxiState::decode(s).action_mask().to_vec()).to_string(),
+            *mask,
+            "state {s}"
+        );
+    }
+}
+
+#[test]
+fn random_maps_are_gymnasiums() {
+    let mut compared = 0;
+    for map in gzipped("random_maps.json.gz")["maps"].as_array().unwrap() {
+        let (size, p) = (map["size"].as_u64().unwrap() as usize, map["p"].as_f64().unwrap());
+        let seed = map["seed"].to_string().trim_matches('"').parse().unwrap();
+        let drawn = generate_random_map(size, p, &seed);
+        // Gymnasium takes a p above 1 for 1.
+        if p > 1.0 {
+            drawn.unwrap_err();
+            continue;
+        }
+        let expected: Vec<String> = serde_json::from_value(map["map"].clone()).unwrap();
+        assert_eq!(drawn.unwrap(), expected, "{map}");
+        compared += 1;
+    }
+    assert_eq!(compared, 105);
+}
+
+#[test]
 fn limits_thresholds_and_spaces_are_gymnasiums() {
     let text = std::fs::read_to_string(folder().join("registry.json")).unwrap();
     let registry: Vec<Value> = serde_json::from_str(&text).unwrap();
@@ -237,9 +278,17 @@ fn limits_thresholds_and_spaces_are_gymnasiums() {
         };
         assert_eq!(theirs["action_space"], actions);
         match &theirs["observation_space"] {
+            Value::String(tuple) if tuple.starts_with("Tuple") => {
+                // The tuple's numbers come first, others that scripts see after them.
+                let fields = env.schema().fields;
+                let spaces: Vec<String> = fields[..tuple.matches("Discrete").count()]
+                    .iter()
+                    .map(|field| format!("Discrete({})", field.high + 1.0))
+                    .collect();
+                assert_eq!(*tuple, format!("Tuple({})", spaces.join(", ")));
+            }
             Value::String(discrete) => {
-                let states = env.finite().unwrap().n_states();
-                assert_eq!(*discrete, format!("Discrete({states})"));
+                assert_eq!(*discrete, format!("Discrete({})", env.n_states().unwrap()));
             }
             space => {
                 assert_eq!(

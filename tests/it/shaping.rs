@@ -83,7 +83,7 @@ fn play<P: Potential<FrozenLake>>(potential: P, agent: &mut Scribe, max_steps: u
     };
     let discretiser = StateIndex { n_states: 16 };
     let mut world = World { env, discretiser, potential, reward: NativeReward };
-    let limits = Limits { episodes: 1, max_steps: Some(max_steps), n_terms: 0 };
+    let limits = Limits { episodes: 1, max_steps: Some(max_steps), ..Limits::EPISODE };
     let mut rng = NumpyRng::from_u64(0);
     let mut rows = Vec::new();
     let stop = AtomicBool::new(false);

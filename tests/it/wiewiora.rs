@@ -41,7 +41,7 @@ where
 {
     let discretiser = StateIndex { n_states: STATES };
     let mut world = World { env: lake(), discretiser, potential, reward };
-    let limits = Limits { episodes: 1500, max_steps: Some(100), n_terms: 0 };
+    let limits = Limits { episodes: 1500, max_steps: Some(100), ..Limits::EPISODE };
     let mut played = Vec::new();
     let each = |row: EpisodeRow| played.push((row.steps, row.native));
     let stop = AtomicBool::new(false);

@@ -72,6 +72,8 @@ pub(super) struct Episode {
     reset_seed: Option<RecordedSeed>,
     pub(super) reset_options: Option<Map<String, Value>>,
     pub(super) reset_obs: RecordedObs,
+    #[serde(default)]
+    pub(super) reset_info: ResetInfo,
     pub(super) steps: Vec<RecordedStep>,
 }
 
@@ -100,6 +102,13 @@ impl Episode {
     }
 }
 
+/// What is compared of a reset's `info`.
+#[derive(Default, Deserialize)]
+pub(super) struct ResetInfo {
+    /// One character per action, `1` for those that can do anything.
+    pub(super) action_mask: Option<String>,
+}
+
 /// A seed: a number, or text if it is 2^64 or more.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "a seed must be an integer of 0 or more, or its digits as text")]
@@ -118,6 +127,8 @@ pub(super) struct RecordedStep {
     pub(super) truncated: bool,
     /// `info["prob"]`, on finite environments.
     pub(super) prob: Option<f64>,
+    /// `info["action_mask"]`, one character per action, where there is one.
+    pub(super) mask: Option<String>,
 }
 
 /// An observation, as recorded.
@@ -133,7 +144,8 @@ impl RecordedObs {
     pub(super) fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Index(index) => vec![*index as f64],
-            // Parsed as float64 and rounded to float32, which is what was written.
+            // Parsed as float64 and rounded to float32, which is what was written. The integers of
+            // a tuple are small enough to stay what they are.
             Self::Box(list) => list.iter().map(|&x| f64::from(x as f32)).collect(),
         }
     }
@@ -143,6 +155,7 @@ impl RecordedObs {
         match (self, obs) {
             (Self::Index(_), Observation::Index(_)) => true,
             (Self::Box(recorded), Observation::Box(obs)) => recorded.len() == obs.len(),
+            (Self::Box(recorded), Observation::Tuple(obs)) => recorded.len() == obs.len(),
             _ => false,
         }
     }

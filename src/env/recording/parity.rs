@@ -4,7 +4,7 @@ use std::io::BufRead;
 
 use super::RecordingError;
 use super::format::{Episode, Header, RecordedObs};
-use crate::env::{Observation, Session};
+use crate::env::{ActionMask, Observation, Session};
 
 /// How exact an environment has to be at some step of an episode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +43,7 @@ pub struct Mismatch {
     pub episode: u64,
     /// How many steps into the episode, from 1; 0 is the reset.
     pub step: usize,
-    /// `obs[i]` (`obs` for an index), `reward`, `terminated`, `truncated` or `prob`.
+    /// `obs[i]` (`obs` for an index), `reward`, `terminated`, `truncated`, `prob` or `mask[i]`.
     pub field: String,
     /// The recorded value.
     pub expected: f64,
@@ -156,6 +156,7 @@ impl Comparison<'_> {
             .reset(seed.as_ref(), episode.reset_options.as_ref())
             .map_err(|e| RecordingError::new(self.line, e))?;
         self.obs(&episode.reset_obs, &obs)?;
+        self.mask(episode.reset_info.action_mask.as_deref(), session.action_mask())?;
         for recorded in &episode.steps {
             self.step += 1;
             let step = session.step(&recorded.action).map_err(|e| {
@@ -168,6 +169,7 @@ impl Comparison<'_> {
             if let (Some(expected), Some(got)) = (recorded.prob, step.probability) {
                 self.number("prob", expected, got);
             }
+            self.mask(recorded.mask.as_deref(), step.mask.as_ref())?;
             self.report.steps += 1;
         }
         Ok(())
@@ -182,6 +184,7 @@ impl Comparison<'_> {
                 match obs {
                     Observation::Index(_) => "an integer".to_owned(),
                     Observation::Box(list) => format!("a list of {} numbers", list.len()),
+                    Observation::Tuple(list) => format!("a list of {} integers", list.len()),
                 }
             );
             return Err(RecordingError::new(self.line, message));
@@ -194,6 +197,33 @@ impl Comparison<'_> {
                     self.number(&format!("obs[{i}]"), expected, f64::from(got));
                 }
             }
+            Observation::Tuple(list) => {
+                for (i, (&got, &expected)) in list.iter().zip(&expected).enumerate() {
+                    self.number(&format!("obs[{i}]"), expected, got as f64);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares an action mask, if one was recorded.
+    fn mask(
+        &mut self,
+        recorded: Option<&str>,
+        mask: Option<&ActionMask>,
+    ) -> Result<(), RecordingError> {
+        let Some(recorded) = recorded else { return Ok(()) };
+        let mask = mask.map_or(&[][..], |mask| &mask.0);
+        if recorded.len() != mask.len() || !recorded.bytes().all(|c| matches!(c, b'0' | b'1')) {
+            let message = format!(
+                "the mask at step {} must be {} characters 0 or 1, not `{recorded}`",
+                self.step,
+                mask.len()
+            );
+            return Err(RecordingError::new(self.line, message));
+        }
+        for (i, (expected, &got)) in recorded.bytes().zip(mask).enumerate() {
+            self.flag(&format!("mask[{i}]"), expected == b'1', got);
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::polygon::Polygon;
 use super::vector::{Rotation, Sweep, Transform, Vec2, vec2};
-use super::{SKIN, MAX_ROTATION, MAX_TRANSLATION};
+use super::{MAX_ROTATION, MAX_TRANSLATION, SKIN};
 
 /// How much larger than its shape a body's box is kept, m, so that it need not change every step.
 const MARGIN: f32 = 0.1;
@@ -251,10 +251,7 @@ impl Place {
         if rotation * rotation > MAX_ROTATION * MAX_ROTATION {
             motion.w *= MAX_ROTATION / rotation.abs();
         }
-        let place = Self {
-            center: self.center + dt * motion.v,
-            angle: self.angle + dt * motion.w,
-        };
+        let place = Self { center: self.center + dt * motion.v, angle: self.angle + dt * motion.w };
         (place, motion)
     }
 }

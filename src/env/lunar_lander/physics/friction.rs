@@ -153,8 +153,7 @@ impl ContactRow {
     /// Applies the impulses it starts with.
     pub(crate) fn warm_start(&self, motion: &mut Motion) {
         for point in &self.points[..self.n] {
-            let impulse =
-                point.normal_impulse * self.normal + point.tangent_impulse * self.tangent;
+            let impulse = point.normal_impulse * self.normal + point.tangent_impulse * self.tangent;
             motion.w += self.inverse_inertia * point.arm.cross(impulse);
             motion.v += self.inverse_mass * impulse;
         }

@@ -70,9 +70,7 @@ impl Approach<'_> {
         let witness = match *axis {
             Axis::Points(axis) => (support(self.edge, axis), on_polygon(-axis)),
             Axis::Edge { normal, .. } => (0, on_polygon(-normal)),
-            Axis::Polygon { normal, .. } => {
-                (support(self.edge, -frame.rotation.apply(normal)), 0)
-            }
+            Axis::Polygon { normal, .. } => (support(self.edge, -frame.rotation.apply(normal)), 0),
         };
         (witness, self.separation(axis, witness, time))
     }

@@ -3,13 +3,13 @@
 //! Hull and legs hang together and are solved as one island; the ground belongs to it but does not
 //! move.
 
+use super::LINEAR_SLOP;
 use super::body::{Motion, Place};
 use super::contact::Contact;
 use super::friction::{ContactRow, correct};
 use super::hinge::HingeRow;
 use super::vector::{Transform, min};
 use super::world::{HULL, LEGS, World};
-use super::LINEAR_SLOP;
 
 const VELOCITY_ITERATIONS: u32 = 180;
 const POSITION_ITERATIONS: u32 = 60;
@@ -172,9 +172,9 @@ impl World {
     /// Moves one body by `dt` from where it met the ground; `first` is the contact that did.
     pub(crate) fn solve_sub_step(&mut self, body: usize, first: usize, dt: f32) {
         let mut rows = std::mem::take(&mut self.rows);
-        let others = (0..self.contacts.len()).rev().filter(|&i| {
-            i != first && self.contacts[i].body == body && self.contacts[i].touching
-        });
+        let others = (0..self.contacts.len())
+            .rev()
+            .filter(|&i| i != first && self.contacts[i].body == body && self.contacts[i].touching);
         let moving = &self.bodies[body];
         let mut place = moving.place();
         let touching = || std::iter::once(first).chain(others.clone()).map(|i| &self.contacts[i]);
@@ -187,8 +187,7 @@ impl World {
                 break;
             }
         }
-        let frame =
-            Transform::about_center(place.center, place.angle, moving.sweep.local_center);
+        let frame = Transform::about_center(place.center, place.angle, moving.sweep.local_center);
         rows.extend(
             touching().map(|contact| ContactRow::new(0, contact, moving, place, frame, None)),
         );

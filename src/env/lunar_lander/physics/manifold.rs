@@ -78,10 +78,7 @@ impl Manifold {
         reference: Reference::Edge,
         normal: Vec2::ZERO,
         point: Vec2::ZERO,
-        points: [ManifoldPoint::new(
-            Vec2::ZERO,
-            Feature { first: 0, second: 0, cut: false },
-        ); 2],
+        points: [ManifoldPoint::new(Vec2::ZERO, Feature { first: 0, second: 0, cut: false }); 2],
         n: 0,
     };
 

@@ -53,7 +53,8 @@ impl Polygon {
                     next = j;
                     continue;
                 }
-                let (to_next, to_candidate) = (points[next] - points[last], candidate - points[last]);
+                let (to_next, to_candidate) =
+                    (points[next] - points[last], candidate - points[last]);
                 let turn = to_next.cross(to_candidate);
                 let farther = to_candidate.length_squared() > to_next.length_squared();
                 if turn < 0.0 || (turn == 0.0 && farther) {

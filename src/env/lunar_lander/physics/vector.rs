@@ -250,14 +250,16 @@ mod tests {
     fn limits_decide_between_zeros() {
         assert!(max(0.0, -0.0).is_sign_negative() && !max(-0.0, 0.0).is_sign_negative());
         assert!(min(0.0, -0.0).is_sign_negative() && !min(-0.0, 0.0).is_sign_negative());
-        assert_eq!([clamp(3.0, -1.0, 1.0), clamp(-3.0, -1.0, 1.0), clamp(0.5, -1.0, 1.0)], [
-            1.0, -1.0, 0.5
-        ]);
+        assert_eq!(
+            [clamp(3.0, -1.0, 1.0), clamp(-3.0, -1.0, 1.0), clamp(0.5, -1.0, 1.0)],
+            [1.0, -1.0, 0.5]
+        );
     }
 
     #[test]
     fn a_transform_and_its_inverse_cancel() {
-        let frame = Transform::about_center(vec2(3.0, 4.0), std::f32::consts::FRAC_PI_2, vec2(1.0, 0.0));
+        let frame =
+            Transform::about_center(vec2(3.0, 4.0), std::f32::consts::FRAC_PI_2, vec2(1.0, 0.0));
         // A quarter turn carries (1, 0) to (0, 1), which is where the centre (3, 4) lies.
         assert!((frame.position - vec2(3.0, 3.0)).length() < 1e-6);
         assert!((frame.apply(vec2(2.0, 0.0)) - vec2(3.0, 5.0)).length() < 1e-6);
