@@ -3,8 +3,8 @@
 //! - [`registry`]: [`specs`], [`find`], [`make`]: from an id and arguments to an [`AnyEnv`], and by
 //!   an [`EnvVisitor`] to static dispatch
 //! - [`cart_pole`], [`mountain_car`], [`mountain_car_continuous`], [`acrobot`], [`pendulum`],
-//!   [`frozen_lake`], [`cliff_walking`], [`taxi`], [`blackjack`]: the dynamics, documented under
-//!   Gymnasium's headings
+//!   [`lunar_lander`], [`frozen_lake`], [`cliff_walking`], [`taxi`], [`blackjack`]: the dynamics,
+//!   documented under Gymnasium's headings
 //! - [`Registered`]: what an environment provides beyond its dynamics; [`KwargSpec`], [`Kwargs`]:
 //!   its constructor's arguments; [`EnvError`]: what can be wrong with them
 //! - [`ActionTable`]: real-valued actions for agents that choose among a few; [`PlayedAction`]: an
@@ -24,6 +24,7 @@ mod config;
 mod error;
 pub mod frozen_lake;
 mod kwargs;
+pub mod lunar_lander;
 pub mod mountain_car;
 pub mod mountain_car_continuous;
 pub mod pendulum;

@@ -12,6 +12,7 @@ use super::cliff_walking::CliffWalking;
 use super::error::{EnvError, did_you_mean, list};
 use super::frozen_lake::FrozenLake;
 use super::kwargs::{KwargSpec, Kwargs};
+use super::lunar_lander::LunarLander;
 use super::mountain_car::MountainCar;
 use super::mountain_car_continuous::MountainCarContinuous;
 use super::pendulum::Pendulum;
@@ -145,6 +146,8 @@ environments! {
     MountainCarContinuous: ["MountainCarContinuous-v0", Some(999), Some(90.0)];
     Acrobot: ["Acrobot-v1", Some(500), Some(-100.0)];
     Pendulum: ["Pendulum-v1", Some(200), None];
+    LunarLander: ["LunarLander-v3", Some(1000), Some(200.0)],
+        ["LunarLanderContinuous-v3", Some(1000), Some(200.0), "continuous" = "true"];
     FrozenLake: ["FrozenLake-v1", Some(100), Some(0.7)],
         ["FrozenLake8x8-v1", Some(200), Some(0.85), "map_name" = "\"8x8\""];
     CliffWalking: ["CliffWalking-v1", None, None],

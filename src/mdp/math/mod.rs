@@ -37,8 +37,10 @@
 //! | exp, tanh, atan2 | as CORE-MATH | 11 to 14 | 4 to 15 |
 //! | ln, log10 | as CORE-MATH | 18, 25 | 3, 7 |
 
+mod single;
 mod trig;
 
+pub use single::sin_cos_f32;
 pub use trig::{cos, sin, sin_cos};
 
 /// Tangent of `x` radians.
