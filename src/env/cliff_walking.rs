@@ -29,6 +29,8 @@
 //!
 //! Deviations: none.
 
+mod draw;
+
 use std::sync::Arc;
 
 use super::error::EnvError;

@@ -60,6 +60,7 @@
 //! 1. A `rainy_probability` or `fickle_probability` outside [0, 1]: Gymnasium samples from what are
 //!    no probabilities.
 
+mod draw;
 mod table;
 #[cfg(test)]
 mod tests;

@@ -126,6 +126,9 @@ pub trait Env: Send {
     fn fields(&self, obs: &Self::Obs, out: &mut [f64]);
 }
 
+/// The largest number of fields a state may have: lets the step use a buffer on the stack.
+pub const MAX_FIELDS: usize = 16;
+
 /// How a field appears in a script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FieldKind {
