@@ -359,3 +359,6 @@ impl Shape {
         shape
     }
 }
+
+#[cfg(test)]
+mod tests;

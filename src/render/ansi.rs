@@ -170,3 +170,90 @@ pub(crate) fn indexed(colour: Colour) -> u32 {
         (16 + 36 * r + 6 * g + b) as u32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::env::scene::Shape;
+
+    const RED: Colour = Colour(200, 0, 0);
+    const BLUE: Colour = Colour(0, 0, 200);
+
+    /// 4 × 2 characters, red on the left of `x` (in characters), blue on the right.
+    fn halves(x: f64) -> Scene {
+        let mut scene = Scene::new([0.0, 0.0], [4.0, 4.0], RED);
+        scene.add(Shape::rect([x, 0.0], [4.0, 4.0], BLUE));
+        scene
+    }
+
+    #[test]
+    fn a_cell_shows_two_colours_in_quarters() {
+        let lines = |x, palette| lines(&halves(x), None, palette, [80, 2]);
+        let (red, blue) = ("48;2;200;0;0", "48;2;0;0;200");
+        assert_eq!(
+            lines(2.0, Palette::Full),
+            vec![format!("\x1b[0;{red}m  \x1b[0;{blue}m  \x1b[0m"); 2]
+        );
+        assert_eq!(
+            lines(1.5, Palette::Full),
+            vec![format!("\x1b[0;{red}m \x1b[0;38;2;200;0;0;{blue}m▌\x1b[0;{blue}m  \x1b[0m"); 2]
+        );
+        // (200, 0, 0) is nearest to (215, 0, 0), number 16 + 36 · 4.
+        assert_eq!(lines(4.0, Palette::Indexed), ["\x1b[0;48;5;160m    \x1b[0m"; 2]);
+    }
+
+    #[test]
+    fn a_corner_is_a_quarter() {
+        let mut scene = Scene::new([0.0, 0.0], [1.0, 2.0], RED);
+        scene.add(Shape::rect([0.5, 0.0], [1.0, 1.0], BLUE));
+        let expected = "\x1b[0;38;2;0;0;200;48;2;200;0;0m▗\x1b[0m";
+        assert_eq!(lines(&scene, None, Palette::Full, [1, 1]), [expected]);
+    }
+
+    #[test]
+    fn without_colours_edges_are_dots() {
+        let mut scene = Scene::new([0.0, 0.0], [4.0, 4.0], RED);
+        // Through the middle of the left dots of the third character.
+        scene.add(Shape::line([[2.25, -1.0], [2.25, 5.0]], 0.1, BLUE));
+        assert_eq!(lines(&scene, None, Palette::Plain, [4, 2]), ["  ⡇", "  ⡇"]);
+        // A plane in front of it hides it, its edges are seen.
+        scene.add(Shape::rect([-9.0, 2.25], [9.0, 9.0], BLUE));
+        let shown = lines(&scene, None, Palette::Plain, [4, 2]);
+        assert_eq!(shown, ["⣀⣀⣀⣀", "  ⡇"]);
+    }
+
+    #[test]
+    fn pictures_fit() {
+        for (size, columns, rows) in
+            [([3.0, 1.0], 60, 10), ([1.0, 3.0], 13, 19), ([1.0, 0.001], 60, 1)]
+        {
+            let scene = Scene::new([0.0, 0.0], size, RED);
+            let shown = lines(&scene, None, Palette::Full, [60, 20]);
+            assert_eq!(shown.len(), rows, "{size:?}");
+            let blanks = shown[0].chars().filter(|&c| c == ' ').count();
+            assert_eq!(blanks, columns, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn text_pictures_keep_their_characters() {
+        let picture = TextPicture {
+            lines: vec![vec![
+                Span::plain("a"),
+                Span::of("b", RED).on(BLUE).bold(),
+                Span::plain("c"),
+            ]],
+        };
+        let show = |palette| lines(&halves(0.0), Some(&picture), palette, [1, 1]);
+        assert_eq!(show(Palette::Plain), ["abc"]);
+        assert_eq!(show(Palette::Full), ["a\x1b[0;1;38;2;200;0;0;48;2;0;0;200mb\x1b[0mc"]);
+    }
+
+    #[test]
+    fn numbered_colours_are_the_nearest() {
+        let numbers =
+            [(0, 0, 0), (255, 255, 255), (255, 0, 0), (8, 8, 8), (128, 128, 128), (95, 135, 175)]
+                .map(|(r, g, b)| indexed(Colour(r, g, b)));
+        assert_eq!(numbers, [16, 231, 196, 232, 244, 67]);
+    }
+}

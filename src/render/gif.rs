@@ -67,32 +67,31 @@ impl Animation {
     /// # Panics
     /// If this one has not.
     pub fn frame(&mut self, image: Image, seconds: f64) {
-        self.asked += seconds * 100.0;
-        let delay = (self.asked.round() as u64).saturating_sub(self.end).max(SHORTEST);
-        self.end += delay;
         let patch = match &self.last {
-            None => Some((0, 0, image.width(), image.height())),
+            None => Some([0, 0, image.width(), image.height()]),
             Some(last) => changed(last, &image),
         };
-        match (patch, self.patches.last_mut()) {
-            (None, Some(same)) => same.delay += delay,
-            (None, None) => unreachable!("the first frame is a change"),
-            (Some((left, top, right, bottom)), _) => {
-                let pixels = self.indices(&image, [left, top, right, bottom]);
-                self.patches.push(Patch { left, top, width: right - left, pixels, delay });
-            }
+        if let Some([left, top, right, bottom]) = patch {
+            let pixels = self.indices(&image, [left, top, right, bottom]);
+            self.patches.push(Patch { left, top, width: right - left, pixels, delay: 0 });
+            self.last = Some(image);
         }
-        self.last = Some(image);
+        self.hold(seconds);
     }
 
     /// Shows the last image for so many seconds more.
     pub fn hold(&mut self, seconds: f64) {
-        if let Some(last) = self.last.take() {
-            self.frame(last, seconds);
-        }
+        let Some(patch) = self.patches.last_mut() else { return };
+        self.asked += seconds * 100.0;
+        let delay = (self.asked.round() as u64).saturating_sub(self.end);
+        // Only a new image needs its shortest delay.
+        let delay = if patch.delay == 0 { delay.max(SHORTEST) } else { delay };
+        patch.delay += delay;
+        self.end += delay;
     }
 
     fn indices(&mut self, image: &Image, [left, top, right, bottom]: [u32; 4]) -> Vec<u16> {
+        // The new image takes its place.
         let last = self.last.take();
         let mut pixels = Vec::with_capacity(((right - left) * (bottom - top)) as usize);
         for y in top..bottom {
@@ -174,7 +173,7 @@ impl Animation {
 
 /// The smallest rectangle (left, top, right, bottom) outside of which two images agree; none if
 /// they are equal.
-fn changed(a: &Image, b: &Image) -> Option<(u32, u32, u32, u32)> {
+fn changed(a: &Image, b: &Image) -> Option<[u32; 4]> {
     assert_eq!((a.width(), a.height()), (b.width(), b.height()), "images of one size");
     let width = a.width();
     let differ = |y: u32| {
@@ -194,11 +193,85 @@ fn changed(a: &Image, b: &Image) -> Option<(u32, u32, u32, u32)> {
             right = right.max(last.unwrap_or(first) as u32 + 1);
         }
     }
-    Some((left, top, right, bottom))
+    Some([left, top, right, bottom])
 }
 
 /// Where the pixels of a piece of a row are in [`Image::bytes`].
 fn row(image: &Image, y: u32, left: u32, right: u32) -> std::ops::Range<usize> {
     let at = |x: u32| 4 * (y as usize * image.width() as usize + x as usize);
     at(left)..at(right)
+}
+
+#[cfg(test)]
+mod tests {
+    use gif::{ColorOutput, DecodeOptions};
+
+    use super::*;
+
+    const RED: Colour = Colour(200, 0, 0);
+    const BLUE: Colour = Colour(0, 0, 200);
+
+    /// The frames as they are in the file: left, top, width, height, delay, pixels (RGBA).
+    fn decode(bytes: &[u8]) -> Vec<([u16; 4], u16, Vec<u8>)> {
+        let mut options = DecodeOptions::new();
+        options.set_color_output(ColorOutput::RGBA);
+        let mut decoder = options.read_info(bytes).unwrap();
+        let mut frames = Vec::new();
+        while let Some(f) = decoder.read_next_frame().unwrap() {
+            frames.push(([f.left, f.top, f.width, f.height], f.delay, f.buffer.to_vec()));
+        }
+        frames
+    }
+
+    /// An image of 6 × 4 red pixels, some of them blue.
+    fn image(blue: &[[i32; 2]]) -> Image {
+        let mut image = Image::new(6, 4, RED);
+        for &[x, y] in blue {
+            image.dot(x, y, BLUE);
+        }
+        image
+    }
+
+    #[test]
+    fn frames_hold_what_has_changed() {
+        let mut animation = Animation::new();
+        animation.frame(image(&[]), 0.1);
+        animation.frame(image(&[[2, 1], [4, 2]]), 0.1);
+        animation.frame(image(&[[2, 1], [4, 2]]), 0.1);
+        animation.frame(image(&[[4, 2]]), 0.1);
+        assert_eq!((animation.frames(), animation.seconds()), (3, 0.4));
+        let frames = decode(&animation.finish());
+        let (red, blue, none) = ([200, 0, 0, 255], [0, 0, 200, 255], [0, 0, 0, 0]);
+        assert_eq!(frames.len(), 3);
+        assert_eq!(frames[0], ([0, 0, 6, 4], 10, red.repeat(24)));
+        // Equal images are one frame; what is between the two pixels is transparent.
+        let change = [blue, none, none, none, none, blue].concat();
+        assert_eq!(frames[1], ([2, 1, 3, 2], 20, change));
+        assert_eq!(frames[2], ([2, 1, 1, 1], 10, red.to_vec()));
+    }
+
+    #[test]
+    fn delays_do_not_drift() {
+        let mut animation = Animation::new();
+        for i in 0..30 {
+            animation.frame(image(&[[i % 6, i / 6 % 4]]), 1.0 / 30.0);
+        }
+        let delays: Vec<u16> = decode(&animation.finish()).iter().map(|f| f.1).collect();
+        assert_eq!(delays.iter().sum::<u16>(), 100);
+        assert!(delays.iter().all(|delay| (3..=4).contains(delay)), "{delays:?}");
+
+        // Faster than a browser shows.
+        let mut animation = Animation::new();
+        for i in 0..3 {
+            animation.frame(image(&[[i, 0]]), 0.001);
+        }
+        animation.hold(1.0);
+        let delays: Vec<u16> = decode(&animation.finish()).iter().map(|f| f.1).collect();
+        assert_eq!(delays, [2, 2, 100 - 4]);
+    }
+
+    #[test]
+    fn nothing_is_an_empty_file() {
+        assert!(Animation::new().finish().is_empty());
+    }
 }

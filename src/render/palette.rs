@@ -50,3 +50,45 @@ fn distance(a: Colour, b: Colour) -> u32 {
     let square = |a: u8, b: u8| u32::from(a.abs_diff(b)) * u32::from(a.abs_diff(b));
     3 * square(a.0, b.0) + 4 * square(a.1, b.1) + 2 * square(a.2, b.2)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_colours_stay_as_they_are() {
+        let colours = [(Colour(1, 2, 3), 5), (Colour(1, 2, 4), 9), (Colour(200, 0, 0), 1)];
+        let (chosen, stand_ins) = choose(&colours, 3);
+        assert_eq!(chosen, [Colour(1, 2, 4), Colour(1, 2, 3), Colour(200, 0, 0)]);
+        assert_eq!(stand_ins, [1, 0, 2]);
+        assert_eq!(choose(&[], 3), (vec![], vec![]));
+    }
+
+    #[test]
+    fn of_many_colours_the_frequent_ones_stay_and_the_rest_finds_a_neighbour() {
+        // Two planes, and all blends between them.
+        let [a, b] = [Colour(250, 249, 246), Colour(38, 50, 70)];
+        let mut colours: Vec<_> =
+            (0..=1000).map(|i| (a.mixed(b, f64::from(i) / 1000.0), 1)).collect();
+        colours.sort_unstable();
+        colours.dedup();
+        for (colour, count) in &mut colours {
+            *count = if *colour == a {
+                10_000
+            } else if *colour == b {
+                5_000
+            } else {
+                1
+            };
+        }
+        let (chosen, stand_ins) = choose(&colours, 16);
+        assert!(chosen.len() <= 16 && chosen.len() > 8, "{}", chosen.len());
+        assert_eq!(chosen[..2], [a, b]);
+        for (&(colour, _), &i) in colours.iter().zip(&stand_ins) {
+            // 16 steps between the planes are about 14 apart in each channel.
+            assert!(colour.0.abs_diff(chosen[i].0) <= 14, "{colour:?} became {:?}", chosen[i]);
+            assert!(i != 0 || colour.0 > 230, "{colour:?} became the background");
+        }
+        assert_eq!(choose(&colours, 1).0, [a]);
+    }
+}

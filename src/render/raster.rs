@@ -157,6 +157,13 @@ impl Image {
         }
     }
 
+    /// Sets a pixel.
+    #[cfg(test)]
+    pub(super) fn dot(&mut self, x: i32, y: i32, Colour(r, g, b): Colour) {
+        let at = 4 * (y * self.width() as i32 + x) as usize;
+        self.pixels.data_mut()[at..at + 3].copy_from_slice(&[r, g, b]);
+    }
+
     /// Writes a line of text whose upper left corner is at a pixel. What does not fit is cut off.
     pub(super) fn text(&mut self, left: i32, top: i32, face: font::Face, ink: Colour, text: &str) {
         let (width, height) = (self.width() as i32, self.height() as i32);

@@ -32,6 +32,8 @@ pub struct Recorder {
     before: Option<Scene>,
     steps: u64,
     total: f64,
+    /// Whether the last image is the end of an episode, which has stood long enough.
+    ended: bool,
 }
 
 impl Recorder {
@@ -46,12 +48,13 @@ impl Recorder {
             before: None,
             steps: 0,
             total: 0.0,
+            ended: false,
         }
     }
 
     /// An episode starts.
     pub fn reset(&mut self, scene: Scene) {
-        (self.steps, self.total) = (0, 0.0);
+        (self.steps, self.total, self.ended) = (0, 0.0, false);
         let image = self.image(&scene, ["", ""]);
         self.animation.frame(image, self.step.max(FIRST));
         self.before = Some(scene);
@@ -79,7 +82,8 @@ impl Recorder {
         }
         let image = self.image(&scene, [action, &right]);
         self.animation.frame(image, rest);
-        if ending.is_some() {
+        self.ended = ending.is_some();
+        if self.ended {
             self.animation.hold(LAST);
         }
         self.before = Some(scene);
@@ -92,7 +96,9 @@ impl Recorder {
 
     /// The file. The last image stands for a while.
     pub fn finish(mut self) -> Vec<u8> {
-        self.animation.hold(LAST);
+        if !self.ended {
+            self.animation.hold(LAST);
+        }
         self.animation.finish()
     }
 

@@ -1,12 +1,13 @@
 //! The moon at night: hills, the pad between its flags, the lander with its legs, and the flames of
 //! the engines that ran.
 
-use super::{HEIGHT, Jet, LunarLander, WIDTH};
+use super::{HEIGHT, Jet, LunarLander, SCALE, WIDTH};
 use crate::env::actions::PlayedAction;
 use crate::env::scene::palette::{
     BLUE, Colour, ICE, INK, MIST, NIGHT, ORANGE, RED, SLATE, WHITE, YELLOW,
 };
-use crate::env::scene::{Draw, Point, Scene, Shape, mix};
+use crate::env::scene::{Draw, Point, Scene, Shape, placed};
+use crate::mdp::math;
 
 /// How far the picture goes on beside and above the world, m.
 const MARGIN: f64 = 0.7;
@@ -35,20 +36,33 @@ impl Draw for LunarLander {
                 flame(&mut scene, &jet, length);
             }
         }
-        for (leg, touches) in self.legs().iter().zip(self.leg_contacts()) {
-            scene.add(Shape::polygon(leg.map(wide), if touches { YELLOW } else { ICE }));
-        }
-        let hull = self.hull().map(wide);
-        scene.add(Shape::polygon(hull, WHITE));
-        // The lower half, and the window.
-        scene.add(Shape::polygon([hull[0], hull[1], hull[2], hull[5]].map(shrink(hull)), BLUE));
-        scene.add(Shape::disc(centre(&hull), 0.17, INK));
+        self.craft(&mut scene);
         self.beyond(&mut scene, high);
         scene
     }
 }
 
 impl LunarLander {
+    fn craft(&self, scene: &mut Scene) {
+        let (turn, middle) = (math::sin_cos(self.angle().into()), self.position().map(f64::from));
+        // Pixels of the hull's own frame.
+        let at = |[x, y]: Point| placed([x / SCALE, y / SCALE], turn, middle);
+        for (leg, touches) in self.legs().iter().zip(self.leg_contacts()) {
+            let leg = leg.map(wide);
+            let colour = if touches { YELLOW } else { ICE };
+            // A strut to the nearer corner of the hull.
+            let knee = centre(&leg);
+            let [left, right] = [at([-15.0, -9.0]), at([15.0, -9.0])];
+            let hip = if square(left, knee) < square(right, knee) { left } else { right };
+            scene.add(Shape::line([hip, knee], 0.07, SLATE));
+            scene.add(Shape::polygon(leg, colour));
+        }
+        scene.add(Shape::polygon(self.hull().map(wide), WHITE));
+        let tank = [[-15.0, -1.0], [-15.0, -8.0], [15.0, -8.0], [15.0, -1.0]];
+        scene.add(Shape::polygon(tank.map(at), BLUE));
+        scene.add(Shape::disc(at([0.0, 8.0]), 0.17, INK));
+    }
+
     fn pad(&self, scene: &mut Scene) {
         let (ends, y) = self.helipad();
         scene.add(Shape::line(ends.map(|x| [x, y]), 0.12, YELLOW));
@@ -124,8 +138,7 @@ fn centre<const N: usize>(points: &[Point; N]) -> Point {
     sum.map(|x| x / N as f64)
 }
 
-/// Towards the middle of `hull`, so that a rim stays.
-fn shrink(hull: [Point; 6]) -> impl Fn(Point) -> Point {
-    let middle = centre(&hull);
-    move |point| mix(point, middle, 0.12)
+fn square(a: Point, b: Point) -> f64 {
+    let (x, y) = (b[0] - a[0], b[1] - a[1]);
+    x * x + y * y
 }
