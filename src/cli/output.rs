@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::Failure;
-use crate::report::heat_map::Ink;
+use crate::render::Palette;
 use crate::script::Diagnostic;
 
 /// Writes to stdout.
@@ -13,13 +13,13 @@ pub(super) fn out(text: &str) -> io::Result<()> {
     stdout.flush()
 }
 
-/// What stdout can show: colours if it is a terminal that has them and `NO_COLOR` is not set.
-pub(super) fn ink() -> Ink {
-    if anstream::AutoStream::choice(&io::stdout()) == anstream::ColorChoice::Never {
-        return Ink::Plain;
+/// The colours that stdout shows: none if it is no terminal or `NO_COLOR` is set.
+pub(super) fn palette() -> Palette {
+    match anstream::AutoStream::choice(&io::stdout()) {
+        anstream::ColorChoice::Never => Palette::Plain,
+        _ if anstyle_query::truecolor() => Palette::Full,
+        _ => Palette::Indexed,
     }
-    let depth = std::env::var("COLORTERM").unwrap_or_default();
-    if matches!(depth.as_str(), "truecolor" | "24bit") { Ink::True } else { Ink::Indexed }
 }
 
 /// Writes a line for humans to stderr. If even that is impossible there is nobody to tell.

@@ -5,8 +5,6 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use anstream::ColorChoice;
-
 use crate::env::scene::{Scene, TextPicture};
 use crate::render::{Palette, lines};
 
@@ -36,11 +34,7 @@ impl Screen {
     pub(super) fn open(is_terminal: bool, fps: f64) -> Self {
         let escapes = anstyle_query::windows::enable_ansi_colors() != Some(false)
             && anstyle_query::term_supports_ansi_color();
-        let palette = match anstream::AutoStream::choice(&io::stdout()) {
-            ColorChoice::Never => Palette::Plain,
-            _ if anstyle_query::truecolor() => Palette::Full,
-            _ => Palette::Indexed,
-        };
+        let palette = super::output::palette();
         let moving = (is_terminal && escapes).then(|| Duration::from_secs_f64(1.0 / fps));
         if moving.is_some() {
             // Without a handler Ctrl-C still ends it, only the cursor stays away.

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 use serde_json::json;
 
-use super::output::{ink, note, out};
+use super::output::{note, out, palette};
 use super::{Failure, Outcome};
-use crate::experiment::write_atomically;
+use crate::experiment::{Unit, write_atomically};
 use crate::report::claims::judge;
 use crate::report::closing::closing_table;
 use crate::report::frame::Request;
@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             continue;
         }
         let there = present.iter().any(|u| u.variant == index);
-        let learns = match tables(&stored, index, seed) {
+        let learns = match tables(&stored, index, seed, &present) {
             Ok(tables) => Some(tables),
             // Asked for by name or not, a variant that is there has to say why it is not shown.
             Err(failure) if only.is_some() || (there && seed != Seeds::First) => {
@@ -122,7 +122,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         write(folder, &all)?;
     } else {
         for picture in &all {
-            out(&format!("\n{}", render(picture, ink())))?;
+            out(&format!("\n{}", render(picture, palette())))?;
         }
     }
     Ok(Outcome::Fine)
@@ -135,15 +135,20 @@ enum Seeds {
     All,
 }
 
-/// The tables of a variant's seeds that are asked for.
-fn tables(stored: &Stored, index: usize, seeds: Seeds) -> Result<Tables, Failure> {
-    if seeds != Seeds::All {
+/// The tables of a variant's seeds that are asked for; of all those that are there.
+fn tables(
+    stored: &Stored,
+    index: usize,
+    seeds: Seeds,
+    present: &[Unit],
+) -> Result<Tables, Failure> {
+    let own = || present.iter().filter(|u| u.variant == index);
+    if seeds != Seeds::All || own().next().is_none() {
         let seed = if let Seeds::One(seed) = seeds { Some(seed) } else { None };
         let unit = stored.unit(index, seed)?;
         let learned = vec![stored.learned(unit)?];
         return Ok(Tables { learned, seeds: vec![unit.seed] });
     }
-    let own = || stored.units.iter().filter(|u| u.variant == index);
     let learned = own().map(|unit| stored.learned(unit)).collect::<Result<_, _>>()?;
     Ok(Tables { learned, seeds: own().map(|u| u.seed).collect() })
 }

@@ -239,6 +239,8 @@ impl Blackjack {
 impl Env for Blackjack {
     type Obs = BlackjackObs;
 
+    const INDEXED: bool = true;
+
     fn n_actions(&self) -> usize {
         N_ACTIONS
     }

@@ -112,6 +112,8 @@ fn walk(probability: f64, s: usize, direction: usize) -> Outcome {
 impl Env for CliffWalking {
     type Obs = FiniteState;
 
+    const INDEXED: bool = true;
+
     fn n_actions(&self) -> usize {
         N_ACTIONS
     }

@@ -227,6 +227,8 @@ impl Map {
 impl Env for FrozenLake {
     type Obs = FiniteState;
 
+    const INDEXED: bool = true;
+
     fn n_actions(&self) -> usize {
         N_ACTIONS
     }

@@ -141,6 +141,8 @@ fn check_probability(name: &str, probability: f64) -> Result<(), EnvError> {
 impl Env for Taxi {
     type Obs = FiniteState;
 
+    const INDEXED: bool = true;
+
     fn n_actions(&self) -> usize {
         N_ACTIONS
     }

@@ -62,6 +62,10 @@ pub trait Env: Send {
     /// An observation: an array of float32 as Gymnasium returns it, or a state index.
     type Obs: Copy + Send + Sync + std::fmt::Debug + 'static;
 
+    /// Whether states have indices: [`Self::n_states`] is not `None`. Known when compiling, so that
+    /// no loop is compiled that cannot run.
+    const INDEXED: bool = false;
+
     /// Number of actions that an agent chooses among; valid ones are `0..n_actions`. Where actions
     /// are real numbers, each stands for an entry of a table.
     fn n_actions(&self) -> usize;

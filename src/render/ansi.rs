@@ -156,7 +156,7 @@ fn encode(line: &[Span], palette: Palette) -> String {
 
 /// The number of the nearest of the 256 colours of xterm, the first 16 aside, which users change:
 /// a cube of 6 × 6 × 6 from 16 on, then 24 greys.
-fn indexed(colour: Colour) -> u32 {
+pub(crate) fn indexed(colour: Colour) -> u32 {
     const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
     let level = |x: u8| (0..6).min_by_key(|&i| LEVELS[i].abs_diff(x)).unwrap_or(0);
     let [r, g, b] = [colour.0, colour.1, colour.2].map(level);

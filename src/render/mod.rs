@@ -16,6 +16,7 @@ mod palette;
 pub mod raster;
 pub mod recorder;
 
+pub(crate) use ansi::indexed;
 pub use ansi::{Palette, lines};
 pub use gif::Animation;
 pub use raster::Image;

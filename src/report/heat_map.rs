@@ -7,17 +7,8 @@ use super::colours::{self, Rgb};
 use super::picture::{Picture, Place, Quantity};
 use super::svg::{minus, number};
 use super::value_map;
-
-/// What the terminal can show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ink {
-    /// Characters alone.
-    Plain,
-    /// The 256 colours that nearly every terminal has.
-    Indexed,
-    /// 24-bit colours.
-    True,
-}
+use crate::env::scene::Colour;
+use crate::render::{Palette, indexed};
 
 /// Places that are shown across and along; of more every second, third, … is left out.
 const WIDE: usize = 80;
@@ -26,7 +17,7 @@ const TALL: usize = 80;
 const ROOMY: usize = 24;
 
 /// The picture as text, each line ended by a newline.
-pub fn render(picture: &Picture, ink: Ink) -> String {
+pub fn render(picture: &Picture, ink: Palette) -> String {
     let mut out =
         format!("{}, {}: {}{}\n", picture.variant, picture.seeds, picture.label, picture.slice());
     if let Some(tiles) = &picture.tiles {
@@ -43,7 +34,7 @@ fn thinned(count: usize, most: usize) -> Vec<usize> {
     (0..count).step_by(count.div_ceil(most)).collect()
 }
 
-fn panel(picture: &Picture, ink: Ink) -> String {
+fn panel(picture: &Picture, ink: Palette) -> String {
     let (x, y) = (&picture.x, &picture.y);
     let columns = thinned(x.n, WIDE);
     let mut rows = thinned(y.n, TALL);
@@ -52,7 +43,7 @@ fn panel(picture: &Picture, ink: Ink) -> String {
     }
     let roomy = y.n <= ROOMY && x.n <= WIDE / 2;
     let lines: Vec<&[usize]> =
-        rows.chunks(if roomy || ink == Ink::Plain { 1 } else { 2 }).collect();
+        rows.chunks(if roomy || ink == Palette::Plain { 1 } else { 2 }).collect();
     let wide = if roomy { 2 } else { 1 };
     let (low, high) = y.edges();
     let (top, bottom) = if y.down { (low, high) } else { (high, low) };
@@ -76,7 +67,7 @@ fn panel(picture: &Picture, ink: Ink) -> String {
         for &i in &columns {
             let upper = picture.place(i, line[0]);
             match (ink, roomy) {
-                (Ink::Plain, _) => {
+                (Palette::Plain, _) => {
                     out.push(character(picture, upper));
                     out.extend(std::iter::repeat_n(' ', wide - 1));
                 }
@@ -97,7 +88,7 @@ fn panel(picture: &Picture, ink: Ink) -> String {
             }
         }
         out.truncate(out.trim_end_matches(' ').len());
-        out.push_str(if ink == Ink::Plain { "\n" } else { "\u{1b}[0m\n" });
+        out.push_str(if ink == Palette::Plain { "\n" } else { "\u{1b}[0m\n" });
     }
     let (low, high) = x.edges();
     let (low, high) =
@@ -109,7 +100,7 @@ fn panel(picture: &Picture, ink: Ink) -> String {
 }
 
 /// A place of two columns: its colour, and the number of its action.
-fn roomy_place(picture: &Picture, place: Place, ink: Ink) -> String {
+fn roomy_place(picture: &Picture, place: Place, ink: Palette) -> String {
     if place == Place::Nothing {
         return "\u{1b}[0m  ".into();
     }
@@ -146,23 +137,20 @@ pub(super) fn colour(picture: &Picture, place: Place) -> Rgb {
 }
 
 /// The escape sequence that makes a colour that of the text (38) or the ground (48).
-pub(super) fn escape(ink: Ink, what: u8, [r, g, b]: Rgb) -> String {
+pub(super) fn escape(ink: Palette, what: u8, [r, g, b]: Rgb) -> String {
     match ink {
-        Ink::Plain => String::new(),
-        Ink::True => format!("\u{1b}[{what};2;{r};{g};{b}m"),
-        Ink::Indexed => {
-            // The colour cube: six levels, 0 and from 95 on in steps of 40.
-            let level = |v: u8| if v < 48 { 0 } else { (v.max(75) - 35) / 40 };
-            let index = 16 + 36 * level(r) + 6 * level(g) + level(b);
-            format!("\u{1b}[{what};5;{index}m")
+        Palette::Plain => String::new(),
+        Palette::Full => format!("\u{1b}[{what};2;{r};{g};{b}m"),
+        Palette::Indexed => {
+            format!("\u{1b}[{what};5;{}m", indexed(Colour(r, g, b)))
         }
     }
 }
 
 /// What characters and colours mean.
-pub(super) fn legend(picture: &Picture, ink: Ink) -> String {
+pub(super) fn legend(picture: &Picture, ink: Palette) -> String {
     let mut parts: Vec<String> = Vec::new();
-    let reset = if ink == Ink::Plain { "" } else { "\u{1b}[0m" };
+    let reset = if ink == Palette::Plain { "" } else { "\u{1b}[0m" };
     match (picture.quantity, picture.range()) {
         (_, None) => parts.push("nothing was learned here".into()),
         (Quantity::Policy, Some(_)) => {
@@ -175,7 +163,7 @@ pub(super) fn legend(picture: &Picture, ink: Ink) -> String {
         }
         (_, Some((low, high))) => {
             let (low, high) = (value_text(low), value_text(high));
-            parts.push(if ink == Ink::Plain {
+            parts.push(if ink == Palette::Plain {
                 format!("0 to 9: {low} to {high}")
             } else {
                 let step = |i: i32| escape(ink, 48, colours::viridis(f64::from(i) / 19.0)) + " ";
@@ -185,7 +173,7 @@ pub(super) fn legend(picture: &Picture, ink: Ink) -> String {
         }
     }
     if picture.has_unknown() {
-        let sample = if ink == Ink::Plain {
+        let sample = if ink == Palette::Plain {
             "·".to_string()
         } else {
             format!("{} {reset}", escape(ink, 48, colours::UNKNOWN))

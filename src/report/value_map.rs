@@ -4,11 +4,12 @@
 use std::fmt::Write as _;
 
 use super::colours;
-use super::heat_map::{Ink, escape, legend, value_text};
+use super::heat_map::{escape, legend, value_text};
 use super::picture::{Picture, Place, Quantity, Tiles};
+use crate::render::Palette;
 
 /// The map, two lines per row: letters with arrows, and values.
-pub(super) fn render(picture: &Picture, tiles: &Tiles, ink: Ink) -> String {
+pub(super) fn render(picture: &Picture, tiles: &Tiles, ink: Palette) -> String {
     let texts: Vec<[String; 2]> = (0..picture.places.len())
         .map(|k| {
             let value = match picture.places[k] {

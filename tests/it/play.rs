@@ -138,8 +138,8 @@ fn the_setting_of_a_variant_is_played_in() {
     let dir = folder();
     let script = r#"
         study("setting", [experiment(#{
-            name: "skip", env: "FrozenLake-v1", agent: q_learning(#{ epsilon: 0.5 }),
-            episodes: 200, seeds: 1, frame_skip: 3, max_steps: 8,
+            name: "skip", env: "CliffWalking-v1", agent: q_learning(#{ epsilon: 0.5 }),
+            episodes: 200, seeds: 1, frame_skip: 3, max_steps: 50,
         }), experiment(#{
             name: "push", env: "MountainCarContinuous-v0", agent: q_learning(),
             discretiser: bins(#{ position: [-1.2, 0.6, 4], velocity: [-0.07, 0.07, 4] }),
@@ -164,7 +164,7 @@ fn the_setting_of_a_variant_is_played_in() {
     let episodes = actions("skip");
     assert_eq!(episodes.len(), 5);
     for episode in &episodes {
-        assert!(episode.len() <= 8);
+        assert!(episode.len() <= 50);
         assert!(episode.chunks(3).all(|held| held.iter().all(|a| *a == held[0])), "{episode:?}");
     }
     assert!(episodes.iter().flatten().any(|a| *a != episodes[0][0]), "more than one action");

@@ -113,7 +113,7 @@ fn what_was_learned_in_bins() {
         let best = number(2).max(number(3)).max(number(4));
         // Φ at the centre of the bin.
         let position = -1.2 + 1.8 * ((cell / 20) as f64 + 0.5) / 20.0;
-        let phi = (3.0 * position).sin();
+        let phi = runner::mdp::math::sin(3.0 * position);
         assert!((potential[place] - phi).abs() < 1e-12, "cell {cell}");
         assert!((value[place] - (best + phi)).abs() < 1e-12, "cell {cell}");
         assert_eq!(policy[place], number(1), "cell {cell}");
@@ -196,6 +196,55 @@ fn slices_through_more_than_two_fields() {
         expect_code(&output, 2);
         assert!(stderr(&output).contains(message), "{more:?}: {}", stderr(&output));
     }
+}
+
+/// The optimal policy as Sutton & Barto print it (figure 5.2), and the fields of finite states.
+#[test]
+fn blackjack_with_and_without_an_ace_and_a_taxis_errand() {
+    let dir = folder();
+    let script = r#"
+        let cards = experiment(#{
+            name: "cards", env: env("Blackjack-v1", #{ sab: true }),
+            agent: value_iteration(#{ gamma: 1.0 }), episodes: 1, seeds: 1,
+        });
+        let taxi = experiment(#{
+            name: "taxi", env: "Taxi-v4", agent: value_iteration(#{ gamma: 0.99 }),
+            episodes: 1, seeds: 1,
+        });
+        study("finite", [cards, taxi])
+    "#;
+    let results = stored(dir.path(), script);
+    let all = json(&results, &["--variant", "cards", "--policy"]);
+    let pictures = all["pictures"].as_array().unwrap();
+    assert_eq!(pictures.len(), 2);
+    for (picture, ace, sticks_from) in [
+        // By the dealer's card from the ace to the ten: the least sum to stick on.
+        (&pictures[0], 0.0, [17, 13, 13, 12, 12, 12, 17, 17, 17, 17]),
+        (&pictures[1], 1.0, [19, 18, 18, 18, 18, 18, 18, 18, 19, 19]),
+    ] {
+        assert_eq!(picture["at"]["ace"], ace);
+        assert_eq!((&picture["x"]["field"], &picture["x"]["low"]), (&"dealer".into(), &1.0.into()));
+        assert_eq!(picture["y"]["field"], "player");
+        let first = picture["y"]["low"].as_f64().unwrap() as usize;
+        for (row, places) in picture["rows"].as_array().unwrap().iter().enumerate() {
+            for (dealer, place) in places.as_array().unwrap().iter().enumerate() {
+                let player = row + first;
+                let Some(action) = place.as_f64() else { continue };
+                let hits = player < sticks_from[dealer];
+                assert_eq!(action == 1.0, hits, "ace {ace}, {player} against {}", dealer + 1);
+            }
+        }
+    }
+    let taxi =
+        json(&results, &["--variant", "taxi", "--policy", "--at", "passenger=0,destination=1"]);
+    let picture = &taxi["pictures"][0];
+    // The passenger waits in the upper left corner: pick up there, else drive.
+    assert_eq!(picture["rows"][0][0], 4.0);
+    assert_eq!(picture["rows"][4][0], 1.0);
+    assert_eq!(picture["at"], serde_json::json!({ "passenger": 0.0, "destination": 1.0 }));
+    let output = show(&results, &["--variant", "taxi", "--at", "passenger=7"]);
+    expect_code(&output, 2);
+    assert!(stderr(&output).contains("takes the values 0, 1, 2, 3, 4"), "{}", stderr(&output));
 }
 
 #[test]
