@@ -64,7 +64,9 @@ pub(crate) struct HingeRow {
     minus_inverse3: f32,
     /// The same of the upper left block.
     minus_inverse2: f32,
-    pub(crate) limit: Limit,
+    limit: Limit,
+    /// The sign of an impulse with which the limit would pull.
+    pull: f32,
     impulse: Impulse,
 }
 
@@ -146,6 +148,7 @@ impl Hinge {
             minus_inverse3: -inverse_or_zero(dot3(ex, ey_ez)),
             minus_inverse2: -inverse_or_zero(ex[0] * ey[1] - ey[0] * ex[1]),
             limit: self.limit,
+            pull: if self.limit == Limit::Lower { -1.0 } else { 1.0 },
             impulse: self.impulse,
         }
     }
@@ -199,33 +202,52 @@ impl Hinge {
 
 impl HingeRow {
     /// One iteration: the motor, then the pin, together with the limit if one is active.
+    ///
+    /// Each operation here waits for the one before, 180 times a step; that is where a simulation's
+    /// time goes. The tests for NaN, which are predicted, keep x and y in different basic blocks:
+    /// otherwise the compiler packs them in pairs, and moving them in and out of the pairs takes
+    /// longer than it saves. (A state of NaN stays one.)
     #[inline(always)]
     pub(crate) fn solve(&mut self, hull: &mut Motion, leg: &mut Motion) {
         self.drive(hull, leg);
+        let (a, b) = (self.hull_arm, self.leg_arm);
         // The point of the leg at the pin, as seen from the hull's.
-        let slip = leg.v + self.leg_arm.spun(leg.w) - hull.v - self.hull_arm.spun(hull.w);
+        let slip_x = leg.v.x + -leg.w * b.y - hull.v.x - -hull.w * a.y;
+        if slip_x.is_nan() {
+            return;
+        }
+        let slip_y = leg.v.y + leg.w * b.x - hull.v.y - hull.w * a.x;
+        let (ex, ey, ez) = (self.ex, self.ey, self.ez);
+        let (x, y, limit);
         if self.limit == Limit::Inactive {
-            let pin = self.pin_only(slip);
-            self.impulse.pin += pin;
-            self.push(hull, leg, pin, 0.0);
+            limit = 0.0;
+            x = self.minus_inverse2 * (ey[1] * slip_x - ey[0] * slip_y);
+            y = self.minus_inverse2 * (ex[0] * slip_y - ex[1] * slip_x);
+            self.push(hull, leg, x, y, limit);
             return;
         }
         let spin = leg.w - hull.w;
-        let (mut pin, mut limit) = self.pin_and_limit(slip, spin);
-        let total = self.impulse.limit + limit;
-        let pulls = if self.limit == Limit::Lower { total < 0.0 } else { total > 0.0 };
+        let slip = [slip_x, slip_y, spin];
+        let [c0, c1, c2] = cross3(ey, slip);
+        let wanted = self.minus_inverse3 * (ex[0] * c0 + ex[1] * c1 + ex[2] * c2);
+        let old = self.impulse.limit;
+        let total = old + wanted;
+        let pulls = total * self.pull > 0.0;
         if pulls {
             // A limit only pushes: without it, the pin alone must make up for what it had given.
-            let old = self.impulse.limit;
-            let without = vec2(old * self.ez[0], old * self.ez[1]) - slip;
-            pin = -self.pin_only(without);
+            let rest_x = slip_x - old * ez[0];
+            let rest_y = slip_y - old * ez[1];
+            x = self.minus_inverse2 * (ey[1] * rest_x - ey[0] * rest_y);
+            y = self.minus_inverse2 * (ex[0] * rest_y - ex[1] * rest_x);
             limit = -old;
             self.impulse.limit = 0.0;
-        } else {
-            self.impulse.limit = total;
+            self.push(hull, leg, x, y, limit);
+            return;
         }
-        self.impulse.pin += pin;
-        self.push(hull, leg, pin, limit);
+        self.impulse.limit = total;
+        x = self.minus_inverse3 * dot3(slip, self.ey_ez);
+        y = self.minus_inverse3 * dot3(ex, cross3(slip, ez));
+        self.push(hull, leg, x, y, wanted);
     }
 
     /// The motor's part of an iteration.
@@ -234,38 +256,33 @@ impl HingeRow {
         let error = leg.w - hull.w - self.motor_speed;
         let old = self.impulse.motor;
         let wanted = old + -self.motor_mass * error;
-        let new = clamp(wanted, -self.max_motor, self.max_motor);
+        let max = self.max_motor;
+        if (wanted >= max && old == max) || (wanted <= -max && old == -max) {
+            // At its limit the motor gives nothing more. That is the rule in the air, and a branch
+            // is predicted where the arithmetic would be waited for.
+            return;
+        }
+        let new = clamp(wanted, -max, max);
         self.impulse.motor = new;
         let impulse = new - old;
         hull.w -= self.hull_inertia * impulse;
         leg.w += self.leg_inertia * impulse;
     }
 
-    /// The impulse at the pin that stops `slip`.
     #[inline(always)]
-    fn pin_only(&self, slip: Vec2) -> Vec2 {
-        vec2(
-            self.minus_inverse2 * (self.ey[1] * slip.x - self.ey[0] * slip.y),
-            self.minus_inverse2 * (self.ex[0] * slip.y - self.ex[1] * slip.x),
-        )
-    }
-
-    /// The impulses at the pin and of the limit that stop `slip` and `spin`: Cramer's rule.
-    #[inline(always)]
-    fn pin_and_limit(&self, slip: Vec2, spin: f32) -> (Vec2, f32) {
-        let b = [slip.x, slip.y, spin];
-        let x = self.minus_inverse3 * dot3(b, self.ey_ez);
-        let y = self.minus_inverse3 * dot3(self.ex, cross3(b, self.ez));
-        let z = self.minus_inverse3 * dot3(self.ex, cross3(self.ey, b));
-        (vec2(x, y), z)
-    }
-
-    #[inline(always)]
-    fn push(&self, hull: &mut Motion, leg: &mut Motion, pin: Vec2, limit: f32) {
-        hull.v -= self.hull_mass * pin;
-        hull.w -= self.hull_inertia * (self.hull_arm.cross(pin) + limit);
-        leg.v += self.leg_mass * pin;
-        leg.w += self.leg_inertia * (self.leg_arm.cross(pin) + limit);
+    fn push(&mut self, hull: &mut Motion, leg: &mut Motion, x: f32, y: f32, limit: f32) {
+        let (a, b) = (self.hull_arm, self.leg_arm);
+        self.impulse.pin.x += x;
+        hull.v.x -= self.hull_mass * x;
+        leg.v.x += self.leg_mass * x;
+        if x.is_nan() {
+            return;
+        }
+        self.impulse.pin.y += y;
+        hull.v.y -= self.hull_mass * y;
+        leg.v.y += self.leg_mass * y;
+        hull.w -= self.hull_inertia * (a.x * y - a.y * x + limit);
+        leg.w += self.leg_inertia * (b.x * y - b.y * x + limit);
     }
 }
 
