@@ -19,7 +19,8 @@ const VIRIDIS: [Rgb; 9] = [
 
 /// The colour of a share from 0 to 1, linear between the table's.
 pub(super) fn viridis(share: f64) -> Rgb {
-    let at = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
+    let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+    let at = share * (VIRIDIS.len() - 1) as f64;
     let i = (at as usize).min(VIRIDIS.len() - 2);
     let part = at - i as f64;
     let mix = |k: usize| {
