@@ -14,6 +14,7 @@
 //! | [`stats`] | IQM, intervals, rolling means |
 //! | [`learn`] | agents and planners |
 //! | [`shaping`] | rewards, potentials, discretisers |
+//! | [`render`] | scenes as pixels, GIFs, characters |
 //! | [`mod@env`] | the environments and their registry |
 //! | [`mdp`] | actions, steps, models, random streams, pinned mathematics |
 
@@ -23,6 +24,7 @@ pub mod env;
 pub mod experiment;
 pub mod learn;
 pub mod mdp;
+pub mod render;
 pub mod report;
 pub mod script;
 pub mod shaping;

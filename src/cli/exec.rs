@@ -13,9 +13,8 @@ use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::{Audit, ExecuteError, Execution, Progress, audit_variant, check, execute};
 use crate::report::claims::{judge, rehearse};
-use crate::report::compare::against_baseline;
+use crate::report::closing::closing_table;
 use crate::report::results::{Findings, FolderError, Results};
-use crate::report::table::{StudyTable, TableRow};
 use crate::script::{Host, Plan, SeedList, load};
 
 #[derive(Debug, ClapArgs)]
@@ -69,7 +68,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         plan.variants.iter().map(|v| audit_variant(&host, v)).collect::<Result<_, _>>()?;
     let findings = results.derive(&plan, &execution, audits)?;
     if !args.quiet {
-        out(&table(&plan, &findings).render())?;
+        out(&closing_table(&plan, &findings).render())?;
     }
     let held = expectations(&plan, &host, &findings, args.quiet)?;
     if !args.quiet {
@@ -191,23 +190,6 @@ fn bar(total: u64, quiet: bool, progress: &'static Progress) -> ProgressBar {
         bar.set_style(style);
     }
     bar
-}
-
-fn table(plan: &Plan, findings: &Findings) -> StudyTable {
-    let rows = findings.summaries.iter().enumerate().map(|(i, summary)| {
-        TableRow::new(summary, findings.steps_per_second[i], findings.audits[i].label())
-    });
-    let mut windows: Vec<u32> = plan.variants.iter().map(|v| v.window).collect();
-    windows.sort_unstable();
-    windows.dedup();
-    let over = match windows[..] {
-        [1] => "native return of the last episode".to_string(),
-        [n] => format!("native return, rolling mean over the last {n} episodes"),
-        _ => "native return, rolling mean over each variant's own window".to_string(),
-    };
-    let mut notes = vec![format!("final: {over} of training, exploration included")];
-    notes.extend(against_baseline(plan, &findings.summaries));
-    StudyTable { rows: rows.collect(), notes }
 }
 
 /// Checks every claim; returns whether all hold.

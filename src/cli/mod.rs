@@ -12,12 +12,17 @@ mod list;
 mod new;
 mod output;
 mod parity;
+mod play;
 mod rollout;
+mod screen;
+mod show;
+mod view;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::report::stored::StoredError;
 use crate::script::Diagnostic;
 
 /// A scriptable reinforcement-learning experiment runner.
@@ -38,6 +43,10 @@ enum Command {
     List(list::Args),
     /// Play actions in an environment and print what happens
     Rollout(rollout::Args),
+    /// Show a results folder: its table, and pictures of what was learned
+    Show(show::Args),
+    /// Play what a unit of a results folder has learned
+    Play(play::Args),
     /// Replay recorded Gymnasium trajectories and compare
     Parity(parity::Args),
     /// Compare what scripts learn with their golden files
@@ -98,6 +107,29 @@ impl From<crate::experiment::StoreError> for Failure {
     }
 }
 
+impl From<crate::env::rollout::RolloutError> for Failure {
+    fn from(e: crate::env::rollout::RolloutError) -> Self {
+        use crate::env::rollout::RolloutError;
+        match e {
+            RolloutError::Env(e) => e.into(),
+            RolloutError::Io(e) => e.into(),
+            RolloutError::Policy(e) => match e.downcast::<Diagnostic>() {
+                Ok(d) => Self::Script(d),
+                Err(e) => Self::Message(e.to_string(), None),
+            },
+        }
+    }
+}
+
+impl From<StoredError> for Failure {
+    fn from(e: StoredError) -> Self {
+        match e {
+            StoredError::Script(d) => Self::Script(d),
+            StoredError::Message(message, hint) => Self::Message(message, hint),
+        }
+    }
+}
+
 /// Parses the arguments, runs the command, maps its outcome to an exit code.
 pub fn main() -> ExitCode {
     match run(Cli::parse()) {
@@ -117,6 +149,8 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
         Command::Check(args) => check::run(&args),
         Command::List(args) => list::run(&args),
         Command::Rollout(args) => rollout::run(&args),
+        Command::Show(args) => show::run(&args),
+        Command::Play(args) => play::run(&args),
         Command::Parity(args) => parity::run(&args),
         Command::Golden(args) => golden::run(&args),
         Command::New(args) => new::run(&args),

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use super::Failure;
+use crate::render::Palette;
 use crate::script::Diagnostic;
 
 /// Writes to stdout.
@@ -10,6 +11,15 @@ pub(super) fn out(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
     stdout.write_all(text.as_bytes())?;
     stdout.flush()
+}
+
+/// The colours that stdout shows: none if it is no terminal or `NO_COLOR` is set.
+pub(super) fn palette() -> Palette {
+    match anstream::AutoStream::choice(&io::stdout()) {
+        anstream::ColorChoice::Never => Palette::Plain,
+        _ if anstyle_query::truecolor() => Palette::Full,
+        _ => Palette::Indexed,
+    }
 }
 
 /// Writes a line for humans to stderr. If even that is impossible there is nobody to tell.

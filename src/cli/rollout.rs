@@ -1,13 +1,16 @@
 //! `runner rollout ENV`
 
-use std::io::Write;
+use std::path::Path;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 
 use super::output::note;
+use super::view::{View, ViewArgs};
 use super::{Failure, Outcome};
-use crate::env::rollout::{RolloutError, parse_actions, random_policy, rollout, rollout_actions};
-use crate::env::{Session, find_with_note};
+use crate::env::rollout::{Event, Length, drive, parse_actions, random_policy};
+use crate::env::{PlayedAction, Session, find_with_note};
+use crate::experiment::play::{Policy, play};
+use crate::experiment::read_table;
 use crate::mdp::numpy::Seed;
 use crate::mdp::streams::Stream;
 
@@ -24,27 +27,15 @@ pub(super) struct Args {
     /// Actions to play, separated by commas; `[a,b],..` where one is a list of numbers
     #[arg(long, value_name = "A,B,..", conflicts_with = "policy", allow_hyphen_values = true)]
     actions: Option<String>,
-    /// Who plays if no actions are given
-    #[arg(long, value_enum, default_value = "random")]
-    policy: Policy,
+    /// Who plays if no actions are given: `random` for uniformly random actions from the seed, or
+    /// the policy.csv of a unit, if the environment is finite
+    #[arg(long, value_name = "random|FILE", default_value = "random")]
+    policy: String,
     /// Number of steps that the policy plays
     #[arg(long, value_name = "N", default_value_t = 100, conflicts_with = "actions")]
     steps: usize,
-    /// How it is printed
-    #[arg(long, value_enum, default_value = "jsonl")]
-    format: Format,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Policy {
-    /// Uniformly random actions, from the seed
-    Random,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Format {
-    /// One JSON object a line
-    Jsonl,
+    #[command(flatten)]
+    view: ViewArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -64,20 +55,54 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         note(&remark);
     }
     let mut session = Session::new(spec.id, &kwargs)?;
-    let mut stdout = std::io::BufWriter::new(std::io::stdout().lock());
-    let (Format::Jsonl, Policy::Random) = (args.format, args.policy);
-    let played = if let Some(actions) = &args.actions {
-        let actions = parse_actions(actions, &session.action_space())?;
-        rollout_actions(&mut session, &seed, &actions, &mut stdout)
+    let actions = match &args.actions {
+        Some(actions) => Some(parse_actions(actions, &session.action_space())?),
+        None => None,
+    };
+    let mut policy = match actions {
+        Some(_) => None,
+        None if args.policy == "random" => None,
+        None => Some(table_policy(&session, Path::new(&args.policy))?),
+    };
+    let mut view = View::open(&args.view, &session)?;
+    let steps = actions.as_ref().map_or(args.steps, Vec::len);
+    let length = Length { steps, episodes: usize::MAX };
+    let each = |session: &Session, event: Event<'_>| view.event(session, event);
+    let played = if let Some(actions) = actions {
+        let mut next = actions.into_iter();
+        // There are exactly as many calls as actions.
+        let list = |_: &Session, _: &_| Ok(next.next().unwrap_or(PlayedAction::Index(-1)));
+        drive(&mut session, &seed, length, list, each)
+    } else if let Some(policy) = &mut policy {
+        play(&mut session, policy, &seed, length, each).map(|_| ())
     } else {
         let stream = Stream::new(seed.words()[0].into(), "policy");
-        let mut policy = random_policy(&session, stream);
-        rollout(&mut session, &seed, args.steps, |_| policy(), &mut stdout)
+        let mut random = random_policy(&session, stream);
+        drive(&mut session, &seed, length, |_, _| Ok(random()), each)
     };
-    let flushed = stdout.flush();
-    match played {
-        Ok(()) => flushed.map(|()| Outcome::Fine).map_err(Failure::from),
-        Err(RolloutError::Env(e)) => Err(e.into()),
-        Err(RolloutError::Io(e)) => Err(e.into()),
+    view.finish(played)?;
+    Ok(Outcome::Fine)
+}
+
+/// The greedy policy of a `policy.csv`. Its rows are states only where the environment is finite:
+/// elsewhere they are cells of a discretiser, which the file does not tell.
+fn table_policy(session: &Session, path: &Path) -> Result<Policy, Failure> {
+    let id = session.spec().id;
+    if !path.exists() {
+        return Err(Failure::Message(
+            format!("--policy: there is no file `{}`", path.display()),
+            Some("give `random`, or the policy.csv of a unit of a results folder".into()),
+        ));
     }
+    let Some(n_states) = session.n_states() else {
+        return Err(Failure::Message(
+            format!(
+                "--policy: {id} is not finite: a policy.csv does not say how its states were \
+                     made into cells"
+            ),
+            Some("runner play RESULTS knows: it takes the discretiser from the script".into()),
+        ));
+    };
+    let q = read_table(path, n_states, session.schema().actions.len())?;
+    Ok(Policy::of_states(q))
 }

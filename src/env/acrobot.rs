@@ -48,6 +48,8 @@
 //! 3. A starting angle beyond 71 476 rad, where NumPy's float32 polynomials end, is observed through
 //!    the float64 functions.
 
+mod draw;
+
 use serde_json::{Map, Value};
 
 use super::bounds;

@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use super::actions::ActionTable;
+use super::actions::{ActionTable, PlayedAction};
 use super::error::EnvError;
-use super::registered::{ActionMask, Observation, Registered};
+use super::registered::{ActionMask, Observation, Registered, Seen};
 use super::registry::AnyEnv;
+use super::scene::{Draw, Scene, TextPicture};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{ActionSpace, Env, FiniteMdp, Schema, Step};
 
 /// An environment, seen through a vtable: for sessions, which are dynamic in every step.
 pub(super) trait Dynamic {
-    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Option<ActionMask>);
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen, Option<ActionMask>);
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep;
     fn step_box(&mut self, action: &[f32], rng: &mut NumpyRng) -> DynamicStep;
     fn set_attribute(&mut self, name: &str, value: &Value) -> Result<(), EnvError>;
@@ -25,12 +26,15 @@ pub(super) trait Dynamic {
     fn action_space(&self) -> ActionSpace;
     fn schema(&self) -> Schema;
     fn finite(&self) -> Option<&Arc<FiniteMdp>>;
+    fn scene(&self, last: Option<&PlayedAction>) -> Scene;
+    fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture>;
     fn n_states(&self) -> Option<usize>;
 }
 
 /// What [`Dynamic::step`] returns.
 pub(super) struct DynamicStep {
     pub(super) obs: Observation,
+    pub(super) seen: Seen,
     pub(super) reward: f64,
     pub(super) terminated: bool,
     /// The probability of the outcome, on finite environments.
@@ -43,15 +47,16 @@ impl DynamicStep {
     fn new<E: Registered>(env: &E, step: Step<E::Obs>) -> Self {
         let (probability, mask) = (env.probability(&step.obs), env.action_mask(&step.obs));
         let (reward, terminated) = (step.reward, step.terminated);
-        Self { obs: step.obs.into(), reward, terminated, probability, mask }
+        let seen = Seen::of(env, &step.obs);
+        Self { obs: step.obs.into(), seen, reward, terminated, probability, mask }
     }
 }
 
 impl<E: Registered> Dynamic for E {
-    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Option<ActionMask>) {
+    fn reset(&mut self, rng: &mut NumpyRng) -> (Observation, Seen, Option<ActionMask>) {
         let obs = Env::reset(self, rng);
         let mask = self.action_mask(&obs);
-        (obs.into(), mask)
+        (obs.into(), Seen::of(self, &obs), mask)
     }
 
     fn step(&mut self, action: usize, rng: &mut NumpyRng) -> DynamicStep {
@@ -99,6 +104,14 @@ impl<E: Registered> Dynamic for E {
     fn n_states(&self) -> Option<usize> {
         Env::n_states(self)
     }
+
+    fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        Draw::scene(self, last)
+    }
+
+    fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        Draw::text(self, last)
+    }
 }
 
 impl AnyEnv {
@@ -130,5 +143,15 @@ impl AnyEnv {
     /// Number of its states, if they are finite (with a model or without).
     pub fn n_states(&self) -> Option<usize> {
         self.dynamic().n_states()
+    }
+
+    /// What its present state looks like; `last` is the action that led to it.
+    pub fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        self.dynamic().scene(last)
+    }
+
+    /// Its present state in characters, if it is a world for them.
+    pub fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        self.dynamic().text(last)
     }
 }

@@ -42,6 +42,7 @@
 //! 2. Stepping on after the end of an episode goes on drawing as in Gymnasium, but of a hand only
 //!    the first 22 cards are remembered (no hand that is still played has more).
 
+mod draw;
 mod model;
 #[cfg(test)]
 mod tests;
@@ -237,6 +238,8 @@ impl Blackjack {
 
 impl Env for Blackjack {
     type Obs = BlackjackObs;
+
+    const INDEXED: bool = true;
 
     fn n_actions(&self) -> usize {
         N_ACTIONS

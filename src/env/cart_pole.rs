@@ -41,6 +41,8 @@
 //! 1. `kinematics_integrator` accepts those two names; Gymnasium takes anything but `"euler"` for
 //!    the semi-implicit scheme.
 
+mod draw;
+
 use serde_json::{Map, Value};
 
 use super::bounds;

@@ -29,6 +29,8 @@
 //!
 //! Deviations: none.
 
+mod draw;
+
 use std::sync::Arc;
 
 use super::error::EnvError;
@@ -109,6 +111,8 @@ fn walk(probability: f64, s: usize, direction: usize) -> Outcome {
 
 impl Env for CliffWalking {
     type Obs = FiniteState;
+
+    const INDEXED: bool = true;
 
     fn n_actions(&self) -> usize {
         N_ACTIONS

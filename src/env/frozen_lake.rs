@@ -39,6 +39,7 @@
 //! 4. A `success_rate` outside [0, 1]: Gymnasium samples from what are no probabilities.
 //! 5. A `reward_schedule` that is not three finite numbers: Gymnasium ignores a fourth.
 
+mod draw;
 mod random_map;
 
 use std::sync::Arc;
@@ -225,6 +226,8 @@ impl Map {
 
 impl Env for FrozenLake {
     type Obs = FiniteState;
+
+    const INDEXED: bool = true;
 
     fn n_actions(&self) -> usize {
         N_ACTIONS

@@ -11,6 +11,7 @@
 //!   action of either kind
 //! - [`EnvConfig`]: everything that may be said about an instance
 //! - [`Session`]: an environment as `gymnasium.make` returns it, dynamic, with its time limit
+//! - [`scene`]: what an environment looks like
 //! - [`rollout`]: an episode as JSON lines; [`recording`]: replaying recorded trajectories
 
 pub mod acrobot;
@@ -32,6 +33,7 @@ pub mod recording;
 mod registered;
 pub mod registry;
 pub mod rollout;
+pub mod scene;
 mod session;
 pub mod taxi;
 

@@ -34,6 +34,10 @@
 //! Deviations:
 //! 1. `goal_velocity` must be finite; Gymnasium takes a NaN, and then no episode terminates.
 
+mod draw;
+
+pub(in crate::env) use draw::valley;
+
 use serde_json::{Map, Value};
 
 use super::bounds;

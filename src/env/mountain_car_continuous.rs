@@ -37,6 +37,8 @@
 //! 1. `goal_velocity` must be finite.
 //! 2. A force of NaN is an error in a session; Gymnasium goes on with a state of NaN.
 
+mod draw;
+
 use serde_json::{Map, Value};
 
 use super::actions::ActionTable;

@@ -42,6 +42,8 @@
 //! 1. `g` must be finite; Gymnasium takes a NaN, and then every number is one.
 //! 2. A torque of NaN is an error in a session; Gymnasium goes on with a state of NaN.
 
+mod draw;
+
 use serde_json::{Map, Value};
 
 use super::actions::ActionTable;

@@ -8,7 +8,8 @@ use serde_json::{Map, Value};
 use super::actions::ActionTable;
 use super::error::EnvError;
 use super::kwargs::{KwargSpec, Kwargs};
-use crate::mdp::{Env, FiniteState};
+use super::scene::Draw;
+use crate::mdp::{Env, FiniteState, MAX_FIELDS};
 
 /// An observation whose type is known at run time only. Serialises as Gymnasium's would: a bare
 /// integer, a list of float32 in the shortest decimal that reads back as the same float32, or a
@@ -33,6 +34,24 @@ impl<const N: usize> From<[f32; N]> for Observation {
 impl From<FiniteState> for Observation {
     fn from(obs: FiniteState) -> Self {
         Self::Index(obs.index.into())
+    }
+}
+
+/// A state as scripts and discretisers see it, whatever the type of its observation.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Seen {
+    /// Its index in the model, on finite environments.
+    pub(super) index: Option<usize>,
+    /// The numbers that the schema names, and zeros.
+    pub(super) fields: [f64; MAX_FIELDS],
+}
+
+impl Seen {
+    /// What `env` says of `obs`.
+    pub(super) fn of<E: Env>(env: &E, obs: &E::Obs) -> Self {
+        let mut fields = [0.0; MAX_FIELDS];
+        env.fields(obs, &mut fields);
+        Self { index: env.state_index(obs), fields }
     }
 }
 
@@ -64,7 +83,7 @@ pub struct Example {
 }
 
 /// An environment that can be made from an id and arguments.
-pub trait Registered: Env<Obs: Into<Observation>> + Clone + 'static {
+pub trait Registered: Env<Obs: Into<Observation>> + Draw + Clone + 'static {
     /// One line for `list`.
     const SUMMARY: &'static str;
 

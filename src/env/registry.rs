@@ -17,6 +17,7 @@ use super::mountain_car::MountainCar;
 use super::mountain_car_continuous::MountainCarContinuous;
 use super::pendulum::Pendulum;
 use super::registered::{Example, Registered};
+use super::scene::Draw;
 use super::taxi::Taxi;
 use crate::mdp::Env;
 
@@ -31,6 +32,8 @@ pub struct EnvSpec {
     pub reward_threshold: Option<f64>,
     /// One line for `list`.
     pub summary: &'static str,
+    /// Steps per second at which it is shown.
+    pub fps: u32,
     /// What a first script for it may say.
     pub example: Example,
     /// The reset options it knows.
@@ -128,6 +131,7 @@ macro_rules! environments {
                 id: $id,
                 max_steps: $steps,
                 reward_threshold: $threshold,
+                fps: <$type as Draw>::FPS,
                 summary: <$type as Registered>::SUMMARY,
                 example: <$type as Registered>::EXAMPLE,
                 reset_options: <$type as Registered>::RESET_OPTIONS,

@@ -31,6 +31,8 @@ pub enum RolloutError {
     Env(EnvError),
     /// A line could not be written.
     Io(io::Error),
+    /// The policy has no action for a state.
+    Policy(Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl fmt::Display for RolloutError {
@@ -38,6 +40,7 @@ impl fmt::Display for RolloutError {
         match self {
             Self::Env(error) => error.fmt(f),
             Self::Io(error) => error.fmt(f),
+            Self::Policy(error) => error.fmt(f),
         }
     }
 }
@@ -64,6 +67,89 @@ struct StepLine<'a> {
     step: &'a SessionStep,
 }
 
+/// Something that happened in a rollout.
+#[derive(Debug, Clone, Copy)]
+pub enum Event<'a> {
+    /// An episode started.
+    Reset {
+        /// The seed of the reset, if it had one.
+        seed: Option<&'a Seed>,
+        /// The first observation.
+        obs: &'a Observation,
+        /// Which actions can do anything, where Gymnasium says so.
+        mask: Option<&'a ActionMask>,
+    },
+    /// An action was played.
+    Step {
+        /// The action.
+        action: &'a PlayedAction,
+        /// What it brought.
+        step: &'a SessionStep,
+    },
+}
+
+impl Event<'_> {
+    /// Writes it as a line of JSON.
+    ///
+    /// # Errors
+    /// If `out` refuses it.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        match *self {
+            Self::Reset { seed, obs, mask } => write_reset(out, seed, obs, mask),
+            Self::Step { action, step } => {
+                serde_json::to_writer(&mut *out, &StepLine { r#type: "step", action, step })?;
+                out.write_all(b"\n")
+            }
+        }
+    }
+}
+
+/// How long a rollout goes on: until the first of both is used up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Length {
+    /// Steps, over all episodes.
+    pub steps: usize,
+    /// Finished episodes.
+    pub episodes: usize,
+}
+
+/// Plays actions chosen by `policy` from a reset with `seed`; `each` hears of every reset and
+/// step, with the session as it then is. The session may have been used before.
+///
+/// # Errors
+/// If the environment refuses an action (the message says which one), and what `policy` and `each`
+/// report.
+pub fn drive(
+    session: &mut Session,
+    seed: &Seed,
+    length: Length,
+    mut policy: impl FnMut(&Session, &Observation) -> Result<PlayedAction, RolloutError>,
+    mut each: impl FnMut(&Session, Event<'_>) -> Result<(), RolloutError>,
+) -> Result<(), RolloutError> {
+    let mut obs = session.reset(Some(seed), None)?;
+    each(session, Event::Reset { seed: Some(seed), obs: &obs, mask: session.action_mask() })?;
+    let (mut episodes, mut ended) = (0, false);
+    for i in 0..length.steps {
+        if episodes == length.episodes {
+            break;
+        }
+        if ended {
+            obs = session.reset(None, None)?;
+            each(session, Event::Reset { seed: None, obs: &obs, mask: session.action_mask() })?;
+        }
+        let action = policy(session, &obs)?;
+        let step = session.step(&action).map_err(|mut error| {
+            error.message = format!("at step {i}: {}", error.message);
+            error
+        })?;
+        each(session, Event::Step { action: &action, step: &step })?;
+        ended = step.terminated || step.truncated;
+        episodes += usize::from(ended);
+        obs = step.obs;
+    }
+    Ok(())
+}
+
 /// Plays `steps` actions chosen by `policy` from a reset with `seed`, writing one JSON line per
 /// reset and step to `out`. The session may have been used before.
 ///
@@ -77,29 +163,9 @@ pub fn rollout(
     mut policy: impl FnMut(&Observation) -> PlayedAction,
     out: &mut dyn Write,
 ) -> Result<(), RolloutError> {
-    let mut obs = session.reset(Some(seed), None)?;
-    write_reset(out, Some(seed), &obs, session.action_mask())?;
-    let mut ended = false;
-    for i in 0..steps {
-        if ended {
-            obs = session.reset(None, None)?;
-            write_reset(out, None, &obs, session.action_mask())?;
-        }
-        let action = policy(&obs);
-        let step = session.step(&action).map_err(|mut error| {
-            error.message = format!("at step {i}: {}", error.message);
-            error
-        })?;
-        serde_json::to_writer(
-            &mut *out,
-            &StepLine { r#type: "step", action: &action, step: &step },
-        )
-        .map_err(io::Error::from)?;
-        out.write_all(b"\n")?;
-        ended = step.terminated || step.truncated;
-        obs = step.obs;
-    }
-    Ok(())
+    let length = Length { steps, episodes: usize::MAX };
+    let each = |_: &Session, event: Event<'_>| Ok(event.write(out)?);
+    drive(session, seed, length, |_, obs| Ok(policy(obs)), each)
 }
 
 /// Plays a list of actions: [`rollout`] with as many steps.

@@ -16,8 +16,9 @@ use serde_json::{Map, Value};
 use super::actions::{ActionTable, PlayedAction, checked_box};
 use super::config::EnvConfig;
 use super::error::EnvError;
-use super::registered::{ActionMask, Observation};
+use super::registered::{ActionMask, Observation, Seen};
 use super::registry::{AnyEnv, EnvSpec, find};
+use super::scene::{Scene, TextPicture};
 use crate::mdp::numpy::{NumpyRng, Seed};
 use crate::mdp::{ActionSpace, Schema};
 
@@ -53,6 +54,7 @@ pub struct Session {
     reset_options: Map<String, Value>,
     /// Steps since the last reset; `None` before the first one.
     elapsed: Option<u32>,
+    seen: Seen,
     mask: Option<ActionMask>,
 }
 
@@ -73,7 +75,18 @@ impl Session {
         let env = spec.build(config)?;
         let schema = env.schema();
         let (limit, reset_options) = (spec.max_steps, config.reset_options.clone());
-        Ok(Self { spec, env, schema, rng: None, limit, reset_options, elapsed: None, mask: None })
+        let seen = Seen::default();
+        Ok(Self {
+            spec,
+            env,
+            schema,
+            rng: None,
+            limit,
+            reset_options,
+            elapsed: None,
+            seen,
+            mask: None,
+        })
     }
 
     /// Replaces the time limit: -1 means none.
@@ -93,6 +106,27 @@ impl Session {
     /// How scripts name its states, and what its actions are called.
     pub fn schema(&self) -> &Schema {
         &self.schema
+    }
+
+    /// Steps since the last reset.
+    pub fn elapsed(&self) -> u32 {
+        self.elapsed.unwrap_or(0)
+    }
+
+    /// Number of states, if they are finite (with a model or without).
+    pub fn n_states(&self) -> Option<usize> {
+        self.env.n_states()
+    }
+
+    /// The index of the present state in the environment's model, if it has one; `None` before the
+    /// first reset.
+    pub fn state_index(&self) -> Option<usize> {
+        self.seen.index
+    }
+
+    /// The numbers of the present state that [`Self::schema`] names; zeros before the first reset.
+    pub fn fields(&self) -> &[f64] {
+        &self.seen.fields[..self.schema.fields.len()]
     }
 
     /// What actions it takes.
@@ -129,6 +163,16 @@ impl Session {
         self.mask.as_ref()
     }
 
+    /// What the present state looks like; `last` is the action that led to it: none after a reset.
+    pub fn scene(&self, last: Option<&PlayedAction>) -> Scene {
+        self.env.scene(last)
+    }
+
+    /// The present state in characters, if it is a world for them.
+    pub fn text(&self, last: Option<&PlayedAction>) -> Option<TextPicture> {
+        self.env.text(last)
+    }
+
     /// Sets an attribute, for example `CartPole`'s `kinematics_integrator`.
     ///
     /// # Errors
@@ -159,8 +203,8 @@ impl Session {
             (None, None) => return Err(EnvError::about("seed", "the first reset needs a seed")),
         };
         self.spec.set_reset_options(&mut self.env, options)?;
-        let (obs, mask) = self.env.dynamic_mut().reset(&mut rng);
-        self.mask = mask;
+        let (obs, seen, mask) = self.env.dynamic_mut().reset(&mut rng);
+        (self.seen, self.mask) = (seen, mask);
         self.rng = Some(rng);
         self.elapsed = Some(0);
         Ok(obs)
@@ -192,6 +236,7 @@ impl Session {
             }
         };
         *elapsed = elapsed.saturating_add(1);
+        self.seen = step.seen;
         self.mask.clone_from(&step.mask);
         Ok(SessionStep {
             obs: step.obs,

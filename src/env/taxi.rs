@@ -60,6 +60,7 @@
 //! 1. A `rainy_probability` or `fickle_probability` outside [0, 1]: Gymnasium samples from what are
 //!    no probabilities.
 
+mod draw;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -139,6 +140,8 @@ fn check_probability(name: &str, probability: f64) -> Result<(), EnvError> {
 
 impl Env for Taxi {
     type Obs = FiniteState;
+
+    const INDEXED: bool = true;
 
     fn n_actions(&self) -> usize {
         N_ACTIONS

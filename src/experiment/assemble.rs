@@ -14,7 +14,7 @@ use crate::shaping::{
 
 /// A state with every field in the middle of its range (0 where that is unbounded): the values of
 /// fields that are not binned.
-fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
+pub(super) fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
     let mut fields = [0.0; MAX_FIELDS];
     for (x, f) in fields.iter_mut().zip(&schema.fields) {
         let middle = f64::midpoint(f.low, f.high);

@@ -6,6 +6,7 @@
 //! - [`Store`]: one immutable folder per unit, committed by an atomic rename
 //! - [`check`]: calls every callback on sampled states before anything is run
 //! - [`audit_variant`]: what can be said exactly about a variant's shaping
+//! - [`play`]: the greedy policy of a stored unit at play; [`Landscape`]: what it says of states
 //! - [`golden`]: a small text that pins down what a script learns
 
 mod assemble;
@@ -13,6 +14,8 @@ mod audit;
 mod check;
 mod execute;
 pub mod golden;
+mod landscape;
+pub mod play;
 mod record;
 mod store;
 mod train;
@@ -30,7 +33,10 @@ fn hex(bytes: &[u8]) -> String {
 pub use audit::{Audit, audit_variant};
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
-pub use record::{EpisodeRow, UnitRecord};
-pub use store::{Store, StoreError, StoredUnit, write_atomically, write_atomically_with};
+pub use landscape::{Landscape, ListedState};
+pub use record::{EpisodeRow, Learned, UnitRecord};
+pub use store::{
+    Store, StoreError, StoredUnit, read_table, write_atomically, write_atomically_with,
+};
 pub use train::{Limits, TrainError, World, train};
 pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};

@@ -33,6 +33,15 @@ pub struct UnitRecord {
     pub sweeps: Vec<f64>,
 }
 
+/// Action values read back from a store.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learned {
+    /// The values; the agent's initial one where nothing was learned.
+    pub q: QTable,
+    /// Whether anything was learned in a state, one flag each.
+    pub experienced: Vec<bool>,
+}
+
 impl UnitRecord {
     /// Steps over all episodes.
     pub fn steps(&self) -> u64 {

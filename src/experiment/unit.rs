@@ -124,8 +124,12 @@ impl EnvVisitor for RunUnit<'_> {
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         match &self.variant.discretiser {
             DiscretiserSpec::StateIndex => {
-                let n_states = env.n_states().unwrap_or(0);
-                self.with_discretiser(env, StateIndex { n_states })
+                if const { E::INDEXED } {
+                    let n_states = env.n_states().unwrap_or(0);
+                    self.with_discretiser(env, StateIndex { n_states })
+                } else {
+                    unreachable!("a plan is resolved with the discretiser that its states need")
+                }
             }
             DiscretiserSpec::Bins(dims) => {
                 let bins = Bins::new(dims).expect("checked when the plan was resolved");
@@ -144,7 +148,8 @@ impl EnvVisitor for RunUnit<'_> {
 }
 
 impl RunUnit<'_> {
-    /// Plain and potential-only runs get loops of their own; other combinations share one.
+    /// Plain and potential-only runs get loops of their own, if the discretiser is fast; other
+    /// combinations share one.
     fn with_discretiser<E, D>(self, env: E, discretiser: D) -> Result<UnitRecord, UnitError>
     where
         E: Env + Clone + 'static,
@@ -156,17 +161,21 @@ impl RunUnit<'_> {
         let potential = assemble::potential(host, variant, &env, n_cells).map_err(fault)?;
         let reward = assemble::reward(host, variant, &env).map_err(fault)?;
         let (agent, sweeps) = assemble::agent(host, variant, &env, n_cells, seed).map_err(fault)?;
-        let mut record = match (potential, reward) {
-            (AnyPotential::No(_), AnyReward::Native(_)) => {
-                let (potential, reward) = (NoPotential, NativeReward);
-                self.with_agent(World { env, discretiser, potential, reward }, agent)
+        let mut record = if const { D::FAST } {
+            match (potential, reward) {
+                (AnyPotential::No(_), AnyReward::Native(_)) => {
+                    let (potential, reward) = (NoPotential, NativeReward);
+                    self.with_agent(World { env, discretiser, potential, reward }, agent)
+                }
+                (AnyPotential::Cell(potential), AnyReward::Native(reward)) => {
+                    self.with_agent(World { env, discretiser, potential, reward }, agent)
+                }
+                (potential, reward) => {
+                    self.with_agent(World { env, discretiser, potential, reward }, agent)
+                }
             }
-            (AnyPotential::Cell(potential), AnyReward::Native(_)) => {
-                self.with_agent(World { env, discretiser, potential, reward: NativeReward }, agent)
-            }
-            (potential, reward) => {
-                self.with_agent(World { env, discretiser, potential, reward }, agent)
-            }
+        } else {
+            self.with_agent(World { env, discretiser, potential, reward }, agent)
         }?;
         record.sweeps = sweeps;
         Ok(record)

@@ -62,6 +62,10 @@ pub trait Env: Send {
     /// An observation: an array of float32 as Gymnasium returns it, or a state index.
     type Obs: Copy + Send + Sync + std::fmt::Debug + 'static;
 
+    /// Whether states have indices: [`Self::n_states`] is not `None`. Known when compiling, so that
+    /// no loop is compiled that cannot run.
+    const INDEXED: bool = false;
+
     /// Number of actions that an agent chooses among; valid ones are `0..n_actions`. Where actions
     /// are real numbers, each stands for an entry of a table.
     fn n_actions(&self) -> usize;
@@ -121,6 +125,9 @@ pub trait Env: Send {
     /// what scripts see as `s.name` and `s[i]`.
     fn fields(&self, obs: &Self::Obs, out: &mut [f64]);
 }
+
+/// The largest number of fields a state may have: lets the step use a buffer on the stack.
+pub const MAX_FIELDS: usize = 16;
 
 /// How a field appears in a script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

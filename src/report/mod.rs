@@ -1,21 +1,33 @@
 //! What a study looks like from outside: summaries, tables and plots of results.
 //!
 //! - [`results`]: the results folder and every file derived from its units
+//! - [`stored`]: a results folder read back, without writing to it
 //! - [`claims`]: what a study expects of its results
 //! - [`manifest`] writes `study.json`
 //! - [`summary`]: per-variant statistics, as in `summary.json`
 //! - [`compare`]: variants against the baseline
 //! - [`curves`]: learning curves as SVG
-//! - [`table`]: the closing table in the terminal
+//! - [`table`]: tables in the terminal; [`closing`]: the one that closes a study
+//! - [`picture`]: a table of action values over two of the state's fields; [`frame`]: which ones
+//! - [`heat_map`], [`value_map`]: pictures in the terminal; [`picture_svg`]: as SVG
+//! - `colours`: a perceptually uniform scale, and colours for actions
 //! - `legend`: the legend of the curves
 //! - `svg`: scales, ticks and escaping for hand-written SVG
 
 pub mod claims;
+pub mod closing;
+mod colours;
 pub mod compare;
 pub mod curves;
+pub mod frame;
+pub mod heat_map;
 mod legend;
 pub mod manifest;
+pub mod picture;
+pub mod picture_svg;
 pub mod results;
+pub mod stored;
 pub mod summary;
 mod svg;
 pub mod table;
+pub mod value_map;

@@ -183,23 +183,32 @@ impl Results {
     /// Adds the new units' times to `timing.json`; returns steps per second per variant.
     fn timing(&self, plan: &Plan, execution: &Execution) -> Result<Vec<Option<f64>>, StoreError> {
         let path = self.folder.join("timing.json");
-        // Times are a circumstance: a file that cannot be read is begun anew.
-        let old = std::fs::read(&path).ok().and_then(|b| serde_json::from_slice(&b).ok());
-        let mut times: BTreeMap<String, (u64, f64)> = old.unwrap_or_default();
+        let mut times = read_times(&self.folder);
         for f in &execution.finished {
             times.insert(f.unit.hash.clone(), (f.steps, f.seconds));
         }
         let text = serde_json::to_string_pretty(&times).expect("plain data");
         write_atomically(&path, format!("{text}\n").as_bytes())?;
-        let rate = |variant| {
-            let own = execution.units.iter().filter(|u| u.variant == variant);
-            let (steps, seconds) = own
-                .filter_map(|u| times.get(&u.hash))
-                .fold((0u64, 0.0), |(steps, seconds), t| (steps + t.0, seconds + t.1));
-            (seconds > 0.0).then(|| steps as f64 / seconds)
-        };
-        Ok((0..plan.variants.len()).map(rate).collect())
+        Ok((0..plan.variants.len()).map(|i| rate(&times, &execution.units, i)).collect())
     }
+}
+
+/// How many steps a unit made and how many seconds it took, by its hash.
+type Times = BTreeMap<String, (u64, f64)>;
+
+/// What `timing.json` says. Times are a circumstance: a file that cannot be read counts as empty.
+pub(super) fn read_times(folder: &Path) -> Times {
+    let bytes = std::fs::read(folder.join("timing.json")).ok();
+    bytes.and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default()
+}
+
+/// Steps per second over a variant's units whose time is known.
+pub(super) fn rate(times: &Times, units: &[Unit], variant: usize) -> Option<f64> {
+    let own = units.iter().filter(|u| u.variant == variant);
+    let (steps, seconds) = own
+        .filter_map(|u| times.get(&u.hash))
+        .fold((0u64, 0.0), |(steps, seconds), t| (steps + t.0, seconds + t.1));
+    (seconds > 0.0).then(|| steps as f64 / seconds)
 }
 
 /// A variant's statistics and verdict as one JSON object: what expectations see as `r.<name>`.

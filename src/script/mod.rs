@@ -31,6 +31,7 @@ mod value;
 mod world;
 
 pub use callback::Callbacks;
+pub(crate) use diagnostic::suggest;
 pub use diagnostic::{Diagnostic, Place, Severity};
 pub use host::{Host, load};
 pub use plan::{

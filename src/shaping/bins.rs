@@ -174,6 +174,9 @@ fn linspace(lo: f64, hi: f64, num: usize) -> Vec<f64> {
 }
 
 impl<E: Env> Discretiser<E> for Bins {
+    /// Where states have indices, bins are the exception.
+    const FAST: bool = !E::INDEXED;
+
     fn n_cells(&self) -> usize {
         self.n_cells
     }

@@ -5,6 +5,10 @@ use crate::mdp::Env;
 
 /// Maps observations to cells `0..n_cells`.
 pub trait Discretiser<E: Env> {
+    /// Whether a cell costs next to nothing, so that the training loop is worth compiling for each
+    /// kind of potential and reward; otherwise one loop serves all.
+    const FAST: bool;
+
     /// Number of cells.
     fn n_cells(&self) -> usize;
 
@@ -23,6 +27,8 @@ pub struct StateIndex {
 }
 
 impl<E: Env> Discretiser<E> for StateIndex {
+    const FAST: bool = true;
+
     fn n_cells(&self) -> usize {
         self.n_states
     }
@@ -51,6 +57,8 @@ impl ScriptedCells {
 }
 
 impl<E: Env> Discretiser<E> for ScriptedCells {
+    const FAST: bool = false;
+
     fn n_cells(&self) -> usize {
         self.n_cells
     }

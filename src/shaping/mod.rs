@@ -17,6 +17,7 @@ mod potential;
 mod reward;
 mod scale;
 
+pub use crate::mdp::MAX_FIELDS;
 pub use bins::{Bins, BinsError, Dim, MAX_CELLS};
 pub use discretiser::{CellFn, Discretiser, ScriptedCells, StateIndex};
 pub use potential::{
@@ -27,9 +28,6 @@ pub use reward::{
     AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,
 };
 pub use scale::Scale;
-
-/// The largest number of fields a state may have: lets the step use a buffer on the stack.
-pub const MAX_FIELDS: usize = 16;
 
 /// A callback failed while training. Carries the script's own error, so that the floors above can
 /// show its place.

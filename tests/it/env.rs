@@ -22,6 +22,7 @@ impl EnvVisitor for Contract {
     fn visit<E: Env + Clone + 'static>(self, mut env: E) -> Trace {
         let schema = env.schema();
         let n = env.n_actions();
+        assert_eq!(E::INDEXED, env.n_states().is_some(), "{}", self.id);
         assert_eq!(schema.actions.len(), n, "{}: a name for every action", self.id);
         let mut rng = NumpyRng::from_u64(self.seed);
         let (mut twin, mut twin_rng) = (env.clone(), rng.clone());

@@ -3,8 +3,19 @@
 use std::path::{Path, PathBuf};
 
 /// From the top down.
-const FLOORS: [&str; 10] =
-    ["cli", "report", "experiment", "script", "audit", "stats", "learn", "shaping", "env", "mdp"];
+const FLOORS: [&str; 11] = [
+    "cli",
+    "report",
+    "experiment",
+    "script",
+    "audit",
+    "stats",
+    "learn",
+    "shaping",
+    "render",
+    "env",
+    "mdp",
+];
 
 /// Lines that a source file may have; beyond about 400 it wants splitting.
 const MAX_LINES: usize = 450;

@@ -99,3 +99,47 @@ study("small", [plain, plain.with(#{ name: "height", potential: height, terms: #
     effort: |t| if t.action == 1 { 0.0 } else { -0.1 },
 } })])
 "#;
+
+/// Planning on dry land and on ice, and an agent that learns nothing.
+pub(crate) const LAKE: &str = r#"
+fn closer(s) { 1.0 - 0.05 * (abs(s.row - s.goal_row) + abs(s.col - s.goal_col)) }
+let dry = experiment(#{
+    name: "dry",
+    env: env("FrozenLake-v1", #{ is_slippery: false }),
+    agent: value_iteration(#{ gamma: 0.99 }),
+    episodes: 20,
+    seeds: 2,
+});
+let ice = dry.with(#{ name: "ice", env: env("FrozenLake-v1", #{ is_slippery: true }) });
+study("lake", [
+    dry,
+    ice,
+    ice.with(#{ name: "ice-shaped", potential: closer }),
+    dry.with(#{ name: "random", agent: random_agent() }),
+]).expect("dry land is easy", |r| r.dry.final_return.mean == 1.0)
+"#;
+
+/// Runs `script` in `folder`; the results folder.
+pub(crate) fn stored(folder: &Path, script: &str) -> PathBuf {
+    let script = write(folder, "study.rhai", script);
+    let results = folder.join("results");
+    let mut command = runner();
+    let output = command.arg("exec").arg(script).arg("--out").arg(&results).output().unwrap();
+    expect_code(&output, 0);
+    results
+}
+
+/// Everything below `folder` that changes when anything there is written: names, and when files
+/// and folders were changed.
+pub(crate) fn untouched(folder: &Path) -> BTreeMap<PathBuf, std::time::SystemTime> {
+    let mut seen = BTreeMap::new();
+    let mut stack = vec![folder.to_path_buf()];
+    while let Some(path) = stack.pop() {
+        if path.is_dir() {
+            stack.extend(std::fs::read_dir(&path).unwrap().map(|e| e.unwrap().path()));
+        }
+        let changed = std::fs::metadata(&path).unwrap().modified().unwrap();
+        seen.insert(path, changed);
+    }
+    seen
+}

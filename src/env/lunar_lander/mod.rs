@@ -67,6 +67,7 @@
 //! 2. `shaping` and `fuel_cost` are additions; their defaults change nothing.
 
 mod craft;
+mod draw;
 mod engines;
 mod entry;
 mod physics;

@@ -100,11 +100,20 @@ pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
     Ok(rows)
 }
 
+/// The value that a variant's table starts with; `None` for planners, which leave none of it.
+pub(super) fn initial_value(variant: &Variant) -> Option<f64> {
+    variant.agent.params.contains_key("initial_q").then(|| variant.agent.float("initial_q"))
+}
+
+/// Whether a row still holds the initial value everywhere: nothing was learned there.
+pub(super) fn is_initial(row: &[f64], initial: Option<f64>) -> bool {
+    initial.is_some_and(|x| row.iter().all(|v| v.to_bits() == x.to_bits()))
+}
+
 /// `state,greedy,q_0,…`: every state whose values differ from the initial ones, the states of a
 /// finite environment all.
 pub(super) fn policy(variant: &Variant, q: &QTable) -> Vec<u8> {
-    let initial =
-        variant.agent.params.contains_key("initial_q").then(|| variant.agent.float("initial_q"));
+    let initial = initial_value(variant);
     let all = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
     let mut csv = csv::Writer::from_writer(Vec::new());
     let mut header = vec!["state".to_string(), "greedy".to_string()];
@@ -112,7 +121,7 @@ pub(super) fn policy(variant: &Variant, q: &QTable) -> Vec<u8> {
     csv.write_record(&header).expect(NEVER);
     for s in 0..q.n_states() {
         let row = q.row(s);
-        if !all && initial.is_some_and(|x| row.iter().all(|v| v.to_bits() == x.to_bits())) {
+        if !all && is_initial(row, initial) {
             continue;
         }
         let mut line = vec![s.to_string(), argmax_tol(row).to_string()];
@@ -122,18 +131,45 @@ pub(super) fn policy(variant: &Variant, q: &QTable) -> Vec<u8> {
     csv_bytes(csv)
 }
 
+/// Reads what [`policy`] writes, for a table of `shape` `(states, actions)`.
 pub(super) fn read_policy(
     bytes: &[u8],
-    n_actions: usize,
+    shape: (usize, usize),
 ) -> Result<Vec<(usize, Vec<f64>)>, String> {
+    let (n_states, n_actions) = shape;
     let mut reader = csv::Reader::from_reader(bytes);
-    let mut table = Vec::new();
+    let mut header = vec!["state".to_string(), "greedy".to_string()];
+    header.extend((0..n_actions).map(|a| format!("q_{a}")));
+    let found = reader.headers().map_err(|e| e.to_string())?;
+    if *found != header {
+        return Err(format!(
+            "is no policy of {n_actions} actions: its header is not `{}`",
+            header.join(",")
+        ));
+    }
+    let mut table: Vec<(usize, Vec<f64>)> = Vec::new();
     for (i, line) in reader.records().enumerate() {
         let line = line.map_err(|e| e.to_string())?;
-        let bad = || format!("line {} cannot be read", i + 2);
-        let state = line.get(0).and_then(|s| s.parse().ok()).ok_or_else(bad)?;
-        let values: Option<Vec<f64>> = line.iter().skip(2).map(|s| s.parse().ok()).collect();
-        table.push((state, values.filter(|v| v.len() == n_actions).ok_or_else(bad)?));
+        let bad = |what: &str| format!("line {}: {what}", i + 2);
+        let state = line.get(0).and_then(|s| s.parse().ok());
+        let state = state.ok_or_else(|| bad("the state is no number"))?;
+        if state >= n_states {
+            return Err(bad(&format!("there is no state {state} among {n_states}")));
+        }
+        if table.last().is_some_and(|(before, _)| *before >= state) {
+            return Err(bad("the states are not in ascending order"));
+        }
+        let values = line.iter().skip(2).map(|s| s.parse().ok().filter(|v: &f64| v.is_finite()));
+        let values: Option<Vec<f64>> = values.collect();
+        let values = values.ok_or_else(|| bad("a value is no finite number"))?;
+        if line[1] != *argmax_tol(&values).to_string() {
+            return Err(bad(&format!(
+                "`greedy` is {}, but by its values it is {}",
+                &line[1],
+                argmax_tol(&values)
+            )));
+        }
+        table.push((state, values));
     }
     Ok(table)
 }

@@ -14,8 +14,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use self::atomic::{is_stale, sync_folder, temporary_prefix};
-use self::format::{ResultFile, SCHEMA, mark, monitor, policy, read_monitor, read_policy, sweeps};
-use super::record::{EpisodeRow, UnitRecord};
+use self::format::{
+    ResultFile, SCHEMA, initial_value, is_initial, mark, monitor, policy, read_monitor,
+    read_policy, sweeps,
+};
+use super::record::{EpisodeRow, Learned, UnitRecord};
 use super::unit::Unit;
 use crate::learn::QTable;
 use crate::script::Variant;
@@ -62,6 +65,42 @@ pub struct StoredUnit {
     pub shape: (usize, usize),
 }
 
+impl StoredUnit {
+    /// The table of action values, if the agent of `variant`, whose unit this is, keeps one.
+    pub fn learned(&self, variant: &Variant) -> Option<Learned> {
+        let (n_states, n_actions) = self.shape;
+        if n_actions == 0 {
+            return None;
+        }
+        let initial = initial_value(variant);
+        let mut q = QTable::new(n_states, n_actions, initial.unwrap_or(0.0));
+        let mut experienced = vec![false; n_states];
+        for (s, values) in &self.q {
+            for (a, value) in values.iter().enumerate() {
+                *q.get_mut(*s, a) = *value;
+            }
+            experienced[*s] = !is_initial(values, initial);
+        }
+        Some(Learned { q, experienced })
+    }
+}
+
+/// Reads a `policy.csv` that holds every one of `n_states` states: what a unit of a finite
+/// environment leaves behind.
+///
+/// # Errors
+/// If it cannot be read or is something else: the line is named.
+pub fn read_table(path: &Path, n_states: usize, n_actions: usize) -> Result<QTable, StoreError> {
+    let bytes = fs::read(path).map_err(|e| StoreError::io(path, "cannot be read", &e))?;
+    let bad = |what: String| StoreError::new(path, what);
+    let rows = read_policy(&bytes, (n_states, n_actions)).map_err(bad)?;
+    if let Some(missing) = (0..n_states).find(|s| rows.get(*s).is_none_or(|row| row.0 != *s)) {
+        return Err(bad(format!("state {missing} of {n_states} is missing, or not in its place")));
+    }
+    let values = rows.into_iter().flat_map(|(_, values)| values).collect();
+    Ok(QTable::from_values(n_actions, values))
+}
+
 /// Names and contents.
 type Files = Vec<(String, Vec<u8>)>;
 
@@ -96,6 +135,12 @@ impl Store {
             }
         }
         Ok(Self { root })
+    }
+
+    /// The store in the results folder `results`, to be read only: nothing is made, nothing is
+    /// cleaned up, and a folder that cannot be written to will do.
+    pub fn read_only(results: &Path) -> Self {
+        Self { root: results.join("units") }
     }
 
     /// Where a unit lies.
@@ -234,7 +279,7 @@ impl Store {
             let bad = |what: String| StoreError::new(&folder.join(name), what);
             match name.as_str() {
                 "monitor.csv" => stored.rows = read_monitor(bytes).map_err(bad)?,
-                "policy.csv" => stored.q = read_policy(bytes, result.actions).map_err(bad)?,
+                "policy.csv" => stored.q = read_policy(bytes, stored.shape).map_err(bad)?,
                 _ => {}
             }
         }

@@ -1,0 +1,139 @@
+//! What a variant's table says of a state: from the numbers that scripts see to the cell they lie
+//! in, and to Φ there. Serves pictures and play, which are outside of training.
+
+use super::assemble::{diagnostic_of, middle};
+use crate::env::{EnvVisitor, Session};
+use crate::mdp::{Env, MAX_FIELDS, Schema};
+use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+use crate::shaping::{Bins, CellFn, Fault, PhiFn};
+
+/// From a state to the row of the table that stands for it.
+pub(super) enum Locate {
+    /// The environment's own state index.
+    Index,
+    /// Uniform bins.
+    Bins(Bins),
+    /// Scripted cells.
+    Cells(CellFn),
+}
+
+impl Locate {
+    pub(super) fn new(host: &Host, variant: &Variant, schema: &Schema) -> Self {
+        match &variant.discretiser {
+            DiscretiserSpec::StateIndex => Self::Index,
+            DiscretiserSpec::Bins(dims) => {
+                Self::Bins(Bins::new(dims).expect("checked when the plan was resolved"))
+            }
+            DiscretiserSpec::Cells { shape, cell } => {
+                Self::Cells(host.callbacks().cells(cell, shape, &variant.normalise, schema))
+            }
+        }
+    }
+
+    /// The row of the session's present state.
+    pub(super) fn present(&mut self, session: &Session) -> Result<usize, Fault> {
+        match self {
+            Self::Index => Ok(session.state_index().expect("only for finite environments")),
+            Self::Bins(bins) => Ok(bins.index(session.fields())),
+            Self::Cells(cell) => cell(session.fields()),
+        }
+    }
+}
+
+/// A state of a finite environment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ListedState {
+    /// Its fields.
+    pub fields: Vec<f64>,
+    /// Whether an episode can be in it and act.
+    pub acts: bool,
+}
+
+/// The states that a variant's table speaks of.
+pub struct Landscape {
+    /// What their numbers are called.
+    pub schema: Schema,
+    /// Every state by its index, on environments whose table goes by it.
+    pub states: Option<Vec<ListedState>>,
+    locate: Locate,
+    phi: Option<PhiFn>,
+    /// Whether Φ is taken at the cell's representative, as in training.
+    on_cell: bool,
+}
+
+impl Landscape {
+    /// The landscape of `variant`.
+    ///
+    /// # Errors
+    /// If the environment cannot be made.
+    pub fn new(host: &Host, variant: &Variant) -> Result<Self, Diagnostic> {
+        let env =
+            variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
+        let schema = env.schema();
+        let by_index = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
+        let locate = Locate::new(host, variant, &schema);
+        let phi = variant.potential.as_ref().map(|phi| host.callbacks().potential(phi, &schema));
+        Ok(Self {
+            states: by_index.then(|| env.visit(ListStates)),
+            on_cell: matches!(locate, Locate::Bins(_)) && variant.potential_on == PhiOn::Cell,
+            schema,
+            locate,
+            phi,
+        })
+    }
+
+    /// A state with every field in the middle of its range, 0 where that is unbounded.
+    pub fn middle(&self) -> Vec<f64> {
+        middle(&self.schema)[..self.schema.fields.len()].to_vec()
+    }
+
+    /// The row of the table for a state with these fields; `None` where states have indices of
+    /// their own (see [`Self::states`]).
+    ///
+    /// # Errors
+    /// If a scripted discretiser fails.
+    pub fn cell(&mut self, fields: &[f64]) -> Result<Option<usize>, Diagnostic> {
+        match &mut self.locate {
+            Locate::Index => Ok(None),
+            Locate::Bins(bins) => Ok(Some(bins.index(fields))),
+            Locate::Cells(cell) => cell(fields).map(Some).map_err(diagnostic_of),
+        }
+    }
+
+    /// Φ as the learner meets it in a state of `cell` with these fields; `None` without one.
+    ///
+    /// # Errors
+    /// If the callback fails.
+    pub fn phi(&mut self, cell: usize, fields: &[f64]) -> Result<Option<f64>, Diagnostic> {
+        let Some(phi) = &mut self.phi else { return Ok(None) };
+        let mut state = [0.0; MAX_FIELDS];
+        let n_fields = self.schema.fields.len();
+        match &self.locate {
+            Locate::Bins(bins) if self.on_cell => {
+                state = middle(&self.schema);
+                bins.centre(cell, &mut state);
+            }
+            _ => state[..n_fields].copy_from_slice(fields),
+        }
+        phi(&state[..n_fields]).map(Some).map_err(diagnostic_of)
+    }
+}
+
+struct ListStates;
+
+impl EnvVisitor for ListStates {
+    type Out = Vec<ListedState>;
+
+    fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
+        let n_fields = env.schema().fields.len();
+        // Without a model nobody knows which states are reached.
+        let reachable = env.finite().map(|mdp| mdp.reachable());
+        let state = |index: usize| {
+            let mut fields = vec![0.0; n_fields];
+            let obs = env.state(index).expect("finite states have an index");
+            env.fields(&obs, &mut fields);
+            ListedState { fields, acts: reachable.as_ref().is_none_or(|r| r[index]) }
+        };
+        (0..env.n_states().unwrap_or(0)).map(state).collect()
+    }
+}
