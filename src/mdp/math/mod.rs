@@ -39,9 +39,11 @@
 //!
 //! [`sin_cos_f32`] is the exception: float32, with the bits of glibc, and not correctly rounded.
 
+mod coarse;
 mod single;
 mod trig;
 
+pub use coarse::{COARSE_ERROR, coarse_cos};
 pub use single::sin_cos_f32;
 pub use trig::{cos, sin, sin_cos};
 
