@@ -13,6 +13,8 @@ pub enum KwargKind {
     Float,
     /// Exactly this many finite numbers.
     Floats(usize),
+    /// One of these names.
+    Choice(&'static [&'static str]),
     /// One of these names, or null.
     Name(&'static [&'static str]),
     /// A list of strings (each may also be a list of one-letter strings), or null.
@@ -39,6 +41,7 @@ impl KwargSpec {
             KwargKind::Bool => "true or false".into(),
             KwargKind::Float => "a finite number".into(),
             KwargKind::Floats(n) => format!("a list of exactly {n} finite numbers"),
+            KwargKind::Choice(names) => format!("one of {}", list(names)),
             KwargKind::Name(names) => format!("one of {}, or null", list(names)),
             KwargKind::Rows => "a list of strings, one per row, or null".into(),
         }
@@ -54,7 +57,7 @@ impl KwargSpec {
                 .filter(|list| list.len() == n)
                 .and_then(|list| list.iter().map(float).collect()),
             KwargKind::Name(_) | KwargKind::Rows if value.is_null() => Some(Value::Null),
-            KwargKind::Name(names) => {
+            KwargKind::Choice(names) | KwargKind::Name(names) => {
                 value.as_str().filter(|name| names.contains(name)).map(Value::from)
             }
             KwargKind::Rows => value.as_array().and_then(|rows| rows.iter().map(row).collect()),
@@ -148,6 +151,14 @@ impl Kwargs {
     /// If it was not declared.
     pub fn floats(&self, name: &str) -> Vec<f64> {
         self.get(name, |v| v.as_array()?.iter().map(Value::as_f64).collect())
+    }
+
+    /// A [`KwargKind::Choice`] argument.
+    ///
+    /// # Panics
+    /// If it was not declared.
+    pub fn choice(&self, name: &str) -> &str {
+        self.get(name, Value::as_str)
     }
 
     /// A [`KwargKind::Name`] argument.

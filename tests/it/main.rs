@@ -12,6 +12,7 @@ mod numbers;
 mod parity;
 mod play;
 mod readme;
+mod refusals;
 mod render;
 mod scripts;
 mod setting;

@@ -120,7 +120,7 @@ impl Registered for LunarLander {
         },
         KwargSpec {
             name: "shaping",
-            kind: KwargKind::Name(&SHAPINGS),
+            kind: KwargKind::Choice(&SHAPINGS),
             default: "\"native\"",
             doc: "\"native\": Gymnasium's reward; \"none\": only fuel and the last step's ±100",
         },
@@ -133,17 +133,13 @@ impl Registered for LunarLander {
     ];
 
     fn from_kwargs(kwargs: &Kwargs) -> Result<Self, EnvError> {
-        let shaping = kwargs.name("shaping").ok_or_else(|| {
-            let message = "`shaping` must be one of `native`, `none`, not null";
-            EnvError::about("shaping", message)
-        })?;
         Self::new(Mission {
             continuous: kwargs.bool("continuous"),
             gravity: kwargs.float("gravity"),
             enable_wind: kwargs.bool("enable_wind"),
             wind_power: kwargs.float("wind_power"),
             turbulence_power: kwargs.float("turbulence_power"),
-            native_shaping: shaping == "native",
+            native_shaping: kwargs.choice("shaping") == "native",
             fuel_cost: kwargs.float("fuel_cost"),
         })
     }
