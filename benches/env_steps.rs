@@ -69,35 +69,60 @@ impl EnvVisitor for Walk {
         let limit = self.spec.max_steps.unwrap_or(u32::MAX);
         let mut stream = Stream::new(0, "bench");
         let actions: Vec<usize> = (0..ACTIONS).map(|_| stream.below(env.n_actions())).collect();
-        let mut lanes: Vec<Lane<E>> = (0..self.lanes)
-            .map(|i| {
-                let (mut env, mut rng) = (env.clone(), NumpyRng::from_u64(i as u64));
-                env.reset(&mut rng);
-                Lane { env, rng, steps: 0 }
-            })
-            .collect();
-        let (mut done, mut next) = (0u64, 0usize);
-        let budget = Duration::from_secs_f64(self.seconds);
-        let start = Instant::now();
-        loop {
+        if self.lanes == 1 {
+            let mut lane = Lane::new(env, 0);
             // Looking at the clock costs as much as a few steps.
-            for _ in 0..(8192 / self.lanes).max(1) {
+            return timed(self.seconds, || {
+                for &action in &actions {
+                    lane.step(action, limit);
+                }
+                actions.len()
+            });
+        }
+        let mut lanes: Vec<Lane<E>> =
+            (0..self.lanes).map(|i| Lane::new(env.clone(), i as u64)).collect();
+        let mut next = 0;
+        timed(self.seconds, || {
+            for _ in 0..8 {
                 for lane in &mut lanes {
-                    let step = lane.env.step(actions[next % ACTIONS], &mut lane.rng);
+                    lane.step(actions[next % ACTIONS], limit);
                     next += 1;
-                    lane.steps += 1;
-                    if step.terminated || lane.steps >= limit {
-                        black_box(lane.env.reset(&mut lane.rng));
-                        lane.steps = 0;
-                    }
-                    black_box(step);
                 }
             }
-            done += (8192 / self.lanes).max(1) as u64 * self.lanes as u64;
-            let took = start.elapsed();
-            if took >= budget {
-                return (done, took.as_secs_f64());
-            }
+            8 * lanes.len()
+        })
+    }
+}
+
+impl<E: Env> Lane<E> {
+    fn new(mut env: E, seed: u64) -> Self {
+        let mut rng = NumpyRng::from_u64(seed);
+        env.reset(&mut rng);
+        Self { env, rng, steps: 0 }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call would be measured too")]
+    fn step(&mut self, action: usize, limit: u32) {
+        let step = self.env.step(action, &mut self.rng);
+        self.steps += 1;
+        if step.terminated || self.steps >= limit {
+            black_box(self.env.reset(&mut self.rng));
+            self.steps = 0;
+        }
+        black_box(step);
+    }
+}
+
+/// Calls `work` for `seconds`: the steps that it says it has done, and the seconds they took.
+fn timed(seconds: f64, mut work: impl FnMut() -> usize) -> (u64, f64) {
+    let (start, budget) = (Instant::now(), Duration::from_secs_f64(seconds));
+    let mut done = 0;
+    loop {
+        done += work() as u64;
+        let took = start.elapsed();
+        if took >= budget {
+            return (done, took.as_secs_f64());
         }
     }
 }

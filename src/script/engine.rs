@@ -72,6 +72,9 @@ impl Context {
 
 /// An engine for the script in `context`.
 pub(super) fn engine(context: &Rc<Context>) -> Engine {
+    // Rhai otherwise takes seeds made up while compiling it, so that hashes, and with them the way in
+    // which a function is looked up, would differ from build to build. It can be set once.
+    let _ = rhai::config::hashing::set_hashing_seed(Some([1, 2, 3, 4]));
     let mut engine = Engine::new_raw();
     StandardPackage::new().register_into_engine(&mut engine);
     limits(&mut engine);

@@ -28,10 +28,10 @@
 //! ground until it touches another one: the last news counts, as in Gymnasium.
 //!
 //! # Rewards
-//! Φ(s') - Φ(s) less fuel, with Φ(s) = -100 √(x² + y²) - 100 √(x_dot² + y_dot²) - 100 |angle|
-//! + 10 for each leg on the ground; 0.3 for a step of the main engine at full power, 0.03 for one
-//! of a side engine. The last step pays -100 (crashed, or left the world) or +100 (came to rest)
-//! *instead*.
+//! Φ(s′) - Φ(s) less fuel, where Φ(s) is -100 times the distance from the pad, less 100 times the
+//! speed, less 100 times the angle's size (all as observed), plus 10 for each leg on the ground. A
+//! step of the main engine at full power costs 0.3, one of a side engine 0.03. The last step pays
+//! -100 (crashed, or left the world) or +100 (came to rest) *instead*.
 //!
 //! That is no potential-based shaping in the sense of Ng, Harada & Russell (1999), which would
 //! leave optimal policies alone: its discount is 1 whatever the learner's γ, and the last step's
@@ -140,8 +140,8 @@ impl Default for Mission {
 #[derive(Debug, Clone)]
 pub struct LunarLander {
     mission: Mission,
-    terrain: Terrain,
-    world: World,
+    terrain: Box<Terrain>,
+    world: Box<World>,
     wind: Option<Wind>,
     /// The built-in shaping's potential of the state before.
     potential: Option<f64>,
@@ -175,9 +175,9 @@ impl LunarLander {
             let message = format!("`fuel_cost` must be 0 or more, not {fuel_cost}");
             return Err(EnvError::about("fuel_cost", message));
         }
-        let terrain = Terrain::flat();
+        let terrain = Box::new(Terrain::flat());
         Ok(Self {
-            world: craft::world(gravity, &terrain),
+            world: Box::new(craft::world(gravity, &terrain)),
             terrain,
             mission,
             wind: None,
@@ -191,8 +191,8 @@ impl LunarLander {
 
     /// Starts an episode over new hills; its first observation is that of a step without engines.
     pub fn reset(&mut self, rng: &mut NumpyRng) -> [f32; 8] {
-        self.terrain = Terrain::draw(rng);
-        self.world = craft::world(self.mission.gravity, &self.terrain);
+        *self.terrain = Terrain::draw(rng);
+        *self.world = craft::world(self.mission.gravity, &self.terrain);
         let force = [(); 2].map(|()| rng.uniform(-INITIAL_FORCE, INITIAL_FORCE) as f32);
         self.world.bodies[HULL].apply_force(vec2(force[0], force[1]));
         self.wind = self.mission.enable_wind.then(|| Wind::draw(rng));
@@ -278,3 +278,6 @@ impl LunarLander {
         reward
     }
 }
+
+#[cfg(test)]
+mod tests;

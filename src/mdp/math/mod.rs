@@ -36,10 +36,14 @@
 //! | tan | as CORE-MATH | 74 | 14 |
 //! | exp, tanh, atan2 | as CORE-MATH | 11 to 14 | 4 to 15 |
 //! | ln, log10 | as CORE-MATH | 18, 25 | 3, 7 |
+//!
+//! [`sin_cos_f32`] is the exception: float32, with the bits of glibc, and not correctly rounded.
 
+mod coarse;
 mod single;
 mod trig;
 
+pub use coarse::{COARSE_ERROR, coarse_cos};
 pub use single::sin_cos_f32;
 pub use trig::{cos, sin, sin_cos};
 

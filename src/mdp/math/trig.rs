@@ -63,7 +63,7 @@ const POINTS: usize = 512;
 
 /// Below this one of the grid points is the nearest: no reduction is needed. It includes
 /// 5/2 π, which is as far as sums of two angles and a quarter turn go.
-const DIRECT: f64 = (POINTS - 1) as f64 / GRID as f64;
+pub(super) const DIRECT: f64 = (POINTS - 1) as f64 / GRID as f64;
 
 /// Up to this the reduction by π/2 is accurate enough: x * 2/π stays below 2^17.
 const REDUCIBLE: f64 = pow2(17);
@@ -170,7 +170,7 @@ const ROUNDER: f64 = 1.5 * pow2(52);
 
 /// The grid point nearest to `a`, for 0 <= a < DIRECT, and how far `a` lies beyond it.
 #[inline]
-fn nearest_point(a: f64) -> (&'static Point, f64) {
+pub(super) fn nearest_point(a: f64) -> (&'static Point, f64) {
     const GRID_ROUNDER: f64 = ROUNDER / GRID as f64;
     let shifted = a + GRID_ROUNDER;
     (&TABLE[shifted.to_bits() as usize % POINTS], a - (shifted - GRID_ROUNDER))
@@ -320,11 +320,19 @@ fn reduced(value: Value) -> Value {
 /// sin and cos of a grid point, each in a multiple of 2^-27 and a rest.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
-struct Point {
+pub(super) struct Point {
     s1: f64,
     s2: f64,
     c1: f64,
     c2: f64,
+}
+
+impl Point {
+    /// sin and cos of the point, in float64.
+    #[inline]
+    pub(super) fn rounded(&self) -> (f64, f64) {
+        (self.s1 + self.s2, self.c1 + self.c2)
+    }
 }
 
 static TABLE: [Point; POINTS] = table();

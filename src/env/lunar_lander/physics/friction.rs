@@ -32,7 +32,7 @@ struct Symmetric {
 }
 
 impl Symmetric {
-    #[inline(always)]
+    #[inline]
     fn apply(self, x: f32, y: f32) -> (f32, f32) {
         (self.xx * x + self.xy * y, self.xy * x + self.yy * y)
     }

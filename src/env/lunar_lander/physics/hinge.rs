@@ -1,4 +1,5 @@
 //! The hinge between the hull and a leg: a revolute joint with a motor and limits.
+#![expect(clippy::inline_always, reason = "the velocity iterations are one loop in registers")]
 
 use super::body::{Body, Motion, Place};
 use super::vector::{Rotation, Vec2, clamp, vec2};

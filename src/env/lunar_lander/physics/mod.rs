@@ -1,7 +1,7 @@
 //! The rigid-body dynamics under the lander: three polygons, two motorised hinges, and a ground of
 //! straight edges.
 //!
-//! The algorithm is Erin Catto's, of his engine Box2D at version 2.3.0: sequential impulses with
+//! The algorithm is Erin Catto's, of his engine `Box2D` at version 2.3.0: sequential impulses with
 //! warm starting (Catto 2005, *Iterative Dynamics with Temporal Coherence*; 2009, *Modeling and
 //! Solving Constraints*), non-linear projection of positions, conservative advancement for
 //! continuous collisions over GJK distances (Catto 2010, 2013), and sleeping. Only what a lander
@@ -28,6 +28,9 @@ mod manifold;
 mod polygon;
 mod vector;
 mod world;
+
+#[cfg(test)]
+mod tests;
 
 pub(crate) use body::Body;
 pub(crate) use hinge::Hinge;
