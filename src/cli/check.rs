@@ -84,12 +84,17 @@ fn describe(plan: &Plan) -> String {
 }
 
 fn rows(v: &Variant) -> Vec<(&'static str, String)> {
-    let kwargs: Vec<String> = v.config.kwargs.iter().map(|(k, x)| format!("{k}: {x}")).collect();
+    // Those that are not as registered.
+    let defaults = v.env.resolve_kwargs(&serde_json::Map::new()).unwrap_or_default();
+    let changed = v.config.kwargs.iter().filter(|(k, x)| defaults.get(*k) != Some(x));
+    let kwargs: Vec<String> = changed.map(|(k, x)| format!("{k}: {x}")).collect();
+    let kwargs =
+        if kwargs.is_empty() { String::new() } else { format!(" ({})", kwargs.join(", ")) };
     let params: Vec<String> = v.agent.params.iter().map(|(k, x)| format!("{k}: {x}")).collect();
     let limit =
         v.max_steps.map_or("without a step limit".into(), |n| format!("of at most {n} steps"));
     let mut rows = vec![
-        ("environment", format!("{} ({})", v.env.id, kwargs.join(", "))),
+        ("environment", format!("{}{kwargs}", v.env.id)),
         ("agent", format!("{}({})", v.agent.spec.name, params.join(", "))),
     ];
     for line in v.setting() {

@@ -68,7 +68,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
             writeln!(out, "    greedy sets {} of {} states", digest(&sets), sets.len())
                 .expect(MEMORY);
             if let Some(grid) = &look.schema.grid {
-                draw_grid(grid, &sets, out);
+                draw_grid(grid, q, &sets, out);
             } else if let (0, DiscretiserSpec::Bins(dims)) = (i, &variant.discretiser) {
                 draw_bins(dims, &look.schema, q, &sets, out);
             }
@@ -126,13 +126,20 @@ fn look(variant: &Variant) -> Result<Look, Diagnostic> {
     Ok(Look { schema: env.visit(Ask) })
 }
 
-/// The map: each cell its tile and the arrows of its greedy set.
-fn draw_grid(grid: &Grid, sets: &[Vec<usize>], out: &mut String) {
+/// Whether nothing was learned in `cell` that would prefer an action.
+fn is_flat(q: &QTable, cell: usize) -> bool {
+    let row = q.row(cell);
+    row.iter().all(|v| *v == row[0])
+}
+
+/// The map: each cell its tile and, where something was learned, the arrows of its greedy set.
+fn draw_grid(grid: &Grid, q: &QTable, sets: &[Vec<usize>], out: &mut String) {
     let cols = grid.rows.first().map_or(0, |r| r.chars().count());
     for (r, row) in grid.rows.iter().enumerate() {
         let cells = row.chars().enumerate().map(|(c, tile)| {
-            let set = &sets[r * cols + c];
-            let arrows: String = if matches!(tile, 'H' | 'G') {
+            let state = r * cols + c;
+            let set = &sets[state];
+            let arrows: String = if matches!(tile, 'H' | 'G') || is_flat(q, state) {
                 String::new()
             } else {
                 set.iter().map(|&a| grid.arrows[a]).collect()
@@ -143,8 +150,8 @@ fn draw_grid(grid: &Grid, sets: &[Vec<usize>], out: &mut String) {
     }
 }
 
-/// The last two binned fields as a map, the others in their middle bins; a digit where one action
-/// is greedy, `*` where several are, `.` where nothing was learned.
+/// The last two binned fields as a map, the others in those bins where the most was learned; a
+/// digit where one action is greedy, `*` where several are, `.` where nothing was learned.
 fn draw_bins(dims: &[Dim], schema: &Schema, q: &QTable, sets: &[Vec<usize>], out: &mut String) {
     let (rows, cols) = match dims {
         [.., a, b] => (Some(a), b),
@@ -152,18 +159,31 @@ fn draw_bins(dims: &[Dim], schema: &Schema, q: &QTable, sets: &[Vec<usize>], out
         [] => return,
     };
     let fixed = &dims[..dims.len().saturating_sub(2)];
-    let base = fixed.iter().fold(0, |cell, d| cell * d.n + d.n / 2);
+    let n_rows = rows.map_or(1, |d| d.n);
+    let size = n_rows * cols.n;
+    let slices: usize = fixed.iter().map(|d| d.n).product();
+    let learned =
+        |slice: usize| (slice * size..(slice + 1) * size).filter(|&cell| !is_flat(q, cell)).count();
+    // The first of those with the most.
+    let best = (0..slices).max_by_key(|&slice| (learned(slice), std::cmp::Reverse(slice)));
+    let base = best.unwrap_or(0);
     let name = |d: &Dim| schema.fields[d.field].name;
     let down = rows.map_or(String::new(), |d| format!(" (down) against {}", name(d)));
-    writeln!(out, "    greedy action by {}{down}:", name(cols)).expect(MEMORY);
-    let n_rows = rows.map_or(1, |d| d.n);
+    let mut rest = base;
+    let mut at: Vec<String> = Vec::new();
+    for d in fixed.iter().rev() {
+        at.push(format!("{} in bin {} of {}", name(d), rest % d.n + 1, d.n));
+        rest /= d.n;
+    }
+    at.reverse();
+    let at = if at.is_empty() { String::new() } else { format!(", {}", at.join(", ")) };
+    writeln!(out, "    greedy action by {}{down}{at}:", name(cols)).expect(MEMORY);
     for r in 0..n_rows {
         let line: String = (0..cols.n)
             .map(|c| {
                 let cell = (base * n_rows + r) * cols.n + c;
-                let row = q.row(cell);
                 match sets[cell].as_slice() {
-                    _ if row.iter().all(|v| *v == row[0]) => '.',
+                    _ if is_flat(q, cell) => '.',
                     [a] => char::from_digit(*a as u32, 36).unwrap_or('?'),
                     _ => '*',
                 }

@@ -19,6 +19,12 @@ pub fn closing_table(plan: &Plan, findings: &Findings) -> StudyTable {
         _ => "native return, rolling mean over each variant's own window".to_string(),
     };
     let mut notes = vec![format!("final: {over} of training, exploration included")];
+    // Nobody can act on a verdict that says only that there is none.
+    let undecided = plan.variants.iter().zip(&findings.audits);
+    let undecided = undecided.filter(|(_, audit)| audit.policy_preserved.is_none());
+    notes.extend(
+        undecided.map(|(v, audit)| format!("{}: {}, {}", v.name, audit.verdict, audit.basis)),
+    );
     notes.extend(against_baseline(plan, &findings.summaries));
     StudyTable { rows: rows.collect(), notes }
 }

@@ -114,21 +114,32 @@ impl Resolver<'_> {
         };
         let discretiser = self.discretiser(draft, &agent, spec, &any, &normalise)?;
         if let Some(clip) = &setting.clip_reward {
-            warnings.push(clipping_warning(clip));
+            let warning = clipping_warning(clip);
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
+            }
         }
         let potential = self.optional(draft.potential.as_ref(), "(s) -> number")?;
         if potential.is_some()
             && draft.potential_raw
             && !matches!(discretiser, DiscretiserSpec::StateIndex)
         {
-            warnings.push(
-                Diagnostic::warning(
-                    "a potential of the raw state is not constant on the discretiser's cells",
-                )
-                .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
-                .note("the greedy policy of the discretised problem may change")
-                .hint("leave out `potential_on: \"raw\"` to evaluate it on each cell's representative"),
-            );
+            let hint = match discretiser {
+                DiscretiserSpec::Bins(_) => {
+                    "leave out `potential_on: \"raw\"` to evaluate it on each cell's representative"
+                }
+                _ => "bins(..) have a representative to evaluate it on, scripted cells do not",
+            };
+            let warning = Diagnostic::warning(
+                "a potential of the raw state is not constant on the discretiser's cells",
+            )
+            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
+            .note("the greedy policy of the discretised problem may change")
+            .hint(hint);
+            // Variants that inherit their potential say it once.
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
+            }
         }
         if potential.is_some()
             && !draft.potential_raw
