@@ -9,6 +9,7 @@ use super::output::out;
 use super::{Failure, Outcome};
 use crate::env::specs;
 use crate::learn::registry::AGENTS;
+use crate::mdp::ActionSpace;
 use crate::script::functions::functions;
 use crate::script::keys::KEYS;
 
@@ -64,10 +65,31 @@ fn envs() -> Result<String, Failure> {
         let fields: Vec<&str> =
             schema.fields.iter().map(|f| f.name).chain(schema.facts.iter().map(|f| f.0)).collect();
         writeln!(text, "    state: {}", fields.join(", ")).expect(MEMORY);
-        let actions = schema.actions.iter().enumerate().map(|(i, a)| format!("{i} {a}"));
-        writeln!(text, "    actions: {}", actions.collect::<Vec<_>>().join(", ")).expect(MEMORY);
+        let named = |open: &str, close: &str| {
+            let actions = schema.actions.iter().enumerate();
+            let actions: Vec<_> = actions.map(|(i, a)| format!("{i} {open}{a}{close}")).collect();
+            actions.join(", ")
+        };
+        match env.action_space() {
+            ActionSpace::Discrete(_) => {
+                writeln!(text, "    actions: {}", named("", "")).expect(MEMORY);
+            }
+            ActionSpace::Box { low, high } => {
+                let bounds = low.iter().zip(high).map(|(low, high)| format!("[{low}, {high}]"));
+                let bounds = bounds.collect::<Vec<_>>().join(" × ");
+                writeln!(text, "    actions: real numbers in {bounds}").expect(MEMORY);
+                writeln!(text, "    an agent chooses among: {}", named("[", "]")).expect(MEMORY);
+            }
+        }
         for arg in spec.kwargs() {
             writeln!(text, "    {} = {}: {}", arg.name, arg.default, arg.doc).expect(MEMORY);
+        }
+        for (what, names) in
+            [("attributes", spec.attributes), ("reset options", spec.reset_options)]
+        {
+            if !names.is_empty() {
+                writeln!(text, "    {what}: {}", names.join(", ")).expect(MEMORY);
+            }
         }
     }
     Ok(text)

@@ -223,9 +223,14 @@ pub fn parse_actions(text: &str, space: &ActionSpace) -> Result<Vec<PlayedAction
                 }
                 ActionSpace::Box { low, .. } => {
                     let bare = (low.len() == 1).then(|| part.parse().ok()).flatten();
+                    let bare = bare.filter(|x: &f64| x.is_finite());
                     let list = bare.map(|x| vec![x]).or_else(|| serde_json::from_str(part).ok());
                     (
-                        if low.len() == 1 { "numbers" } else { "lists of numbers [a, b]" },
+                        if low.len() == 1 {
+                            "finite numbers"
+                        } else {
+                            "lists of finite numbers [a, b]"
+                        },
                         list.map(PlayedAction::Box),
                     )
                 }
@@ -354,11 +359,11 @@ mod tests {
         for (text, space, message) in [
             ("0,x,1", discrete, "actions are integers separated by commas, but number 2 is `x`"),
             ("0,0.5", discrete, "actions are integers separated by commas, but number 2 is `0.5`"),
-            ("0.5,x", one, "actions are numbers separated by commas, but number 2 is `x`"),
+            ("0.5,x", one, "actions are finite numbers separated by commas, but number 2 is `x`"),
             (
                 "[1,0],0.5",
                 two,
-                "actions are lists of numbers [a, b] separated by commas, but number 2 is `0.5`",
+                "actions are lists of finite numbers [a, b] separated by commas, but number 2 is `0.5`",
             ),
         ] {
             assert_eq!(parse(text, space).unwrap_err(), message);

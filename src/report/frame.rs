@@ -1,6 +1,6 @@
 //! Which two of the state's numbers a picture spans, and where the others stand.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
@@ -8,6 +8,7 @@ use super::stored::StoredError;
 use crate::experiment::{Landscape, ListedState};
 use crate::mdp::{Field, FieldKind};
 use crate::script::{DiscretiserSpec, Variant, suggest};
+use crate::shaping::Bins;
 
 /// Places along an axis whose field is not cut into bins.
 const UNBINNED: usize = 60;
@@ -126,7 +127,8 @@ struct Choice<'a> {
 }
 
 /// The frames of a variant's pictures: one, or one per value of a remaining field that has two
-/// common ones.
+/// common ones. Fields that nobody chose stand where the most was learned: `learned` lists the rows
+/// of the table that hold anything.
 ///
 /// # Errors
 /// If `request` names a field that there is not, or one that cannot be an axis.
@@ -134,6 +136,7 @@ pub(super) fn frames(
     landscape: &Landscape,
     variant: &Variant,
     request: &Request,
+    learned: &[usize],
 ) -> Result<Vec<Frame>, StoredError> {
     let choice = Choice { landscape, variant, telling: telling(landscape, variant) };
     let (x, y) = choice.axes(request)?;
@@ -155,6 +158,7 @@ pub(super) fn frames(
     }
     let fixed: Vec<usize> =
         choice.telling.iter().copied().filter(|&f| f != x.field && f != y.field).collect();
+    choice.stand_where_learned(&mut base, &fixed, request, learned)?;
     let is_map = landscape.schema.grid.as_ref().is_some_and(|grid| {
         landscape.states.is_some()
             && (x.name.as_str(), y.name.as_str()) == ("col", "row")
@@ -274,6 +278,67 @@ impl Choice<'_> {
             format!("--at {name}={value}: no episode is ever there"),
             Some(format!("`{name}` takes the values {}", values.join(", "))),
         ))
+    }
+
+    /// Moves the `fixed` fields of `base` that nobody chose to where the most was learned.
+    fn stand_where_learned(
+        &self,
+        base: &mut [f64],
+        fixed: &[usize],
+        request: &Request,
+        learned: &[usize],
+    ) -> Result<(), StoredError> {
+        let mut chosen = Vec::new();
+        for (name, _) in &request.at {
+            chosen.push(self.field(name)?);
+        }
+        // The value of a field in a row of the table: a state's own, or the middle of its bin.
+        let bins = match &self.variant.discretiser {
+            DiscretiserSpec::Bins(dims) => Bins::new(dims).ok(),
+            _ => None,
+        };
+        let fields_of = |row: usize| {
+            if let Some(states) = &self.landscape.states {
+                return states.get(row).filter(|s| s.acts).map(|s| s.fields.clone());
+            }
+            let mut fields = base.to_vec();
+            bins.as_ref()?.centre(row, &mut fields);
+            Some(fields)
+        };
+        // Rows are counted under the place at which their fixed fields stand, in an order of their
+        // own, so that of equals the first is taken.
+        let mut counts: BTreeMap<Vec<u64>, (usize, usize)> = BTreeMap::new();
+        for &row in learned {
+            let Some(fields) = fields_of(row) else { continue };
+            if chosen.iter().all(|&f| self.is_beside(f, fields[f], base[f])) {
+                let place = fixed.iter().map(|&f| fields[f].to_bits()).collect();
+                counts.entry(place).or_insert((0, row)).0 += 1;
+            }
+        }
+        let mut best: Option<(usize, usize)> = None;
+        for &(count, row) in counts.values() {
+            if best.is_none_or(|(most, first)| (count, first) > (most, row)) {
+                best = Some((count, row));
+            }
+        }
+        let Some(fields) = best.and_then(|(_, row)| fields_of(row)) else { return Ok(()) };
+        for &f in fixed.iter().filter(|f| !chosen.contains(f)) {
+            if !self.is_beside(f, fields[f], base[f]) {
+                base[f] = fields[f];
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether `value` of a field is in the bin whose middle is `middle`, or the same if there are
+    /// no bins.
+    fn is_beside(&self, field: usize, middle: f64, value: f64) -> bool {
+        let bin = match &self.variant.discretiser {
+            DiscretiserSpec::Bins(dims) => dims.iter().find(|d| d.field == field),
+            _ => None,
+        };
+        let slack = bin.map_or(0.0, |d| (d.hi - d.lo) / d.n as f64 / 2.0);
+        (middle - value).abs() <= slack
     }
 
     /// Where fields stand that nobody chose: in the middle of their bins, or of their range.

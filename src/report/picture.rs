@@ -154,7 +154,10 @@ pub fn pictures(
 ) -> Result<Vec<Picture>, StoredError> {
     let mut landscape = Landscape::new(host, variant)?;
     let mut pictures = Vec::new();
-    for frame in frames(&landscape, variant, request)? {
+    let n_cells = tables.learned.first().map_or(0, |one| one.experienced.len());
+    let learned: Vec<usize> =
+        (0..n_cells).filter(|&c| tables.learned.iter().any(|one| one.experienced[c])).collect();
+    for frame in frames(&landscape, variant, request, &learned)? {
         let cells = spots(&mut landscape, &frame)?;
         for &quantity in quantities {
             if quantity == Quantity::Potential && variant.potential.is_none() {

@@ -73,7 +73,7 @@ pub(super) fn json(value: &Dynamic) -> Result<serde_json::Value, String> {
             Value::Int(x) => (*x).into(),
             Value::Float(x) => serde_json::Number::from_f64(*x)
                 .map(serde_json::Value::Number)
-                .ok_or_else(|| format!("{x} is not a finite number"))?,
+                .ok_or_else(|| format!("{x}: it must be finite"))?,
             Value::Char(x) => x.to_string().into(),
             Value::Str(x) => x.clone().into(),
             Value::Array(items) => {

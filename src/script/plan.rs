@@ -142,6 +142,12 @@ impl Variant {
         if let Some(range) = self.clip_reward {
             lines.push(format!("clip_reward {range:?}"));
         }
+        for scale in &self.normalise {
+            // The variant's environment has been built before.
+            let Ok(env) = self.environment() else { continue };
+            let name = env.schema().fields[scale.field].name;
+            lines.push(format!("normalise {name} from [{:?}, {:?}]", scale.low, scale.high));
+        }
         lines
     }
 
