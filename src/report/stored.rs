@@ -63,6 +63,12 @@ impl Stored {
     pub fn open(folder: &Path) -> Result<Self, StoredError> {
         let shown = folder.display();
         let manifest = manifest_of(folder)?;
+        if !folder.join("script.rhai").exists() {
+            return Err(StoredError::new(
+                format!("{shown}: was stopped before anything was run"),
+                "run the script again, into the same folder",
+            ));
+        }
         let mut plan = load(&folder.join("script.rhai"))?;
         if let Some(name) = manifest["study"].as_str() {
             plan.name = name.to_string();

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use runner::env::{AnyEnv, EnvVisitor, Observation, Session, find, specs};
 use runner::mdp::numpy::{NumpyRng, Seed};
+use runner::mdp::streams::Stream;
 use runner::mdp::{Env, FieldKind};
 use serde_json::Map;
 
@@ -190,4 +191,44 @@ fn huge_seeds_are_gymnasiums() {
     let Observation::Box(obs) = session.reset(Some(&seed), None).unwrap() else { unreachable!() };
     let printed = ["0.02453693", "0.03373969", "-0.00698495", "-0.00379939"];
     assert_eq!(obs.iter().map(|x| format!("{x:.8}")).collect::<Vec<_>>(), printed);
+}
+
+/// Plays random actions and counts the heap allocations of steps.
+struct Allocations {
+    limit: u32,
+}
+
+impl EnvVisitor for Allocations {
+    type Out = u64;
+
+    fn visit<E: Env + Clone + 'static>(self, mut env: E) -> u64 {
+        let (mut rng, mut actions) = (NumpyRng::from_u64(1), Stream::new(1, "allocations"));
+        env.reset(&mut rng);
+        let (mut played, mut allocated) = (0, 0);
+        for _ in 0..5000 {
+            let action = actions.below(env.n_actions());
+            let mut ended = false;
+            let info = allocation_counter::measure(|| {
+                ended = env.step(action, &mut rng).terminated;
+            });
+            played += 1;
+            allocated += info.count_total;
+            if ended || played >= self.limit {
+                env.reset(&mut rng);
+                played = 0;
+            }
+        }
+        allocated
+    }
+}
+
+#[test]
+fn steps_do_not_allocate() {
+    let seen = allocation_counter::measure(|| drop(std::hint::black_box(vec![1u8; 100])));
+    assert!(seen.count_total > 0, "the counter counts");
+    for spec in specs() {
+        let limit = spec.max_steps.unwrap_or(u32::MAX);
+        let count = spec.make(&Map::new()).unwrap().visit(Allocations { limit });
+        assert_eq!(count, 0, "{}", spec.id);
+    }
 }

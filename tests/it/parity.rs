@@ -265,6 +265,7 @@ fn random_maps_are_gymnasiums() {
 fn limits_thresholds_and_spaces_are_gymnasiums() {
     let text = std::fs::read_to_string(folder().join("registry.json")).unwrap();
     let registry: Vec<Value> = serde_json::from_str(&text).unwrap();
+    assert_eq!(registry.len(), specs().len());
     for spec in specs() {
         let theirs = registry.iter().find(|theirs| theirs["id"] == spec.id).unwrap();
         assert_eq!(spec.max_steps.map(u64::from), theirs["max_episode_steps"].as_u64());
