@@ -58,7 +58,7 @@ use super::kwargs::{KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::{NumpyRng, sin_cos_f32};
-use crate::mdp::{Action, Env, Field, FieldKind, Schema, Step};
+use crate::mdp::{Action, Env, Field, Schema, Step, widen};
 
 const PI: f64 = std::f64::consts::PI;
 /// rad/s.
@@ -183,19 +183,14 @@ impl Env for Acrobot {
     }
 
     fn schema(&self) -> Schema {
-        let field = |name, doc, bound: f64| {
-            // The bounds of the space are float32.
-            let bound = f64::from(bound as f32);
-            Field { name, kind: FieldKind::Float, doc, low: -bound, high: bound }
-        };
         Schema {
             fields: vec![
-                field("cos1", "cosine of the first link's angle from hanging down", 1.0),
-                field("sin1", "sine of the first link's angle from hanging down", 1.0),
-                field("cos2", "cosine of the second link's angle from the first", 1.0),
-                field("sin2", "sine of the second link's angle from the first", 1.0),
-                field("dot1", "angular velocity of the first link, rad/s", MAX_SPEED_1),
-                field("dot2", "angular velocity of the second link, rad/s", MAX_SPEED_2),
+                Field::symmetric("cos1", "cosine of the first link's angle from hanging down", 1.0),
+                Field::symmetric("sin1", "sine of the first link's angle from hanging down", 1.0),
+                Field::symmetric("cos2", "cosine of the second link's angle from the first", 1.0),
+                Field::symmetric("sin2", "sine of the second link's angle from the first", 1.0),
+                Field::symmetric("dot1", "angular velocity of the first link, rad/s", MAX_SPEED_1),
+                Field::symmetric("dot2", "angular velocity of the second link, rad/s", MAX_SPEED_2),
             ],
             facts: Vec::new(),
             actions: ["-1", "0", "+1"].map(Into::into).into(),
@@ -205,9 +200,7 @@ impl Env for Acrobot {
 
     #[inline]
     fn fields(&self, obs: &[f32; 6], out: &mut [f64]) {
-        for (out, &x) in out.iter_mut().zip(obs) {
-            *out = f64::from(x);
-        }
+        widen(obs, out);
     }
 }
 

@@ -51,7 +51,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, Env, Field, FieldKind, Schema, Step};
+use crate::mdp::{Action, Env, Field, Schema, Step, widen};
 
 /// m/s².
 const GRAVITY: f64 = 9.8;
@@ -181,17 +181,12 @@ impl Env for CartPole {
     }
 
     fn schema(&self) -> Schema {
-        let field = |name, doc, bound: f64| {
-            // The bounds of the space are float32.
-            let bound = f64::from(bound as f32);
-            Field { name, kind: FieldKind::Float, doc, low: -bound, high: bound }
-        };
         Schema {
             fields: vec![
-                field("x", "position of the cart, m", 2.0 * X_LIMIT),
-                field("x_dot", "velocity of the cart, m/s", f64::INFINITY),
-                field("theta", "angle of the pole from upright, rad", 2.0 * THETA_LIMIT),
-                field("theta_dot", "angular velocity of the pole, rad/s", f64::INFINITY),
+                Field::symmetric("x", "position of the cart, m", 2.0 * X_LIMIT),
+                Field::symmetric("x_dot", "velocity of the cart, m/s", f64::INFINITY),
+                Field::symmetric("theta", "angle of the pole from upright, rad", 2.0 * THETA_LIMIT),
+                Field::symmetric("theta_dot", "angular velocity of the pole, rad/s", f64::INFINITY),
             ],
             facts: Vec::new(),
             actions: ["left", "right"].map(Into::into).into(),
@@ -201,9 +196,7 @@ impl Env for CartPole {
 
     #[inline]
     fn fields(&self, obs: &[f32; 4], out: &mut [f64]) {
-        for (out, &x) in out.iter_mut().zip(obs) {
-            *out = f64::from(x);
-        }
+        widen(obs, out);
     }
 }
 

@@ -46,7 +46,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, Env, Field, FieldKind, Schema, Step};
+use crate::mdp::{Action, Env, Field, Schema, Step, widen};
 
 const MIN_POSITION: f64 = -1.2;
 const MAX_POSITION: f64 = 0.6;
@@ -123,24 +123,15 @@ impl Env for MountainCar {
     }
 
     fn schema(&self) -> Schema {
-        // The bounds of the space are float32.
-        let widen = |x: f64| f64::from(x as f32);
         Schema {
             fields: vec![
-                Field {
-                    name: "position",
-                    kind: FieldKind::Float,
-                    doc: "position of the car; the goal is at 0.5, the valley's floor at -0.5236",
-                    low: widen(MIN_POSITION),
-                    high: widen(MAX_POSITION),
-                },
-                Field {
-                    name: "velocity",
-                    kind: FieldKind::Float,
-                    doc: "velocity of the car, position per step",
-                    low: widen(-MAX_SPEED),
-                    high: widen(MAX_SPEED),
-                },
+                Field::float(
+                    "position",
+                    "position of the car; the goal is at 0.5, the valley's floor at -0.5236",
+                    MIN_POSITION,
+                    MAX_POSITION,
+                ),
+                Field::symmetric("velocity", "velocity of the car, position per step", MAX_SPEED),
             ],
             facts: Vec::new(),
             actions: ["left", "none", "right"].map(Into::into).into(),
@@ -150,9 +141,7 @@ impl Env for MountainCar {
 
     #[inline]
     fn fields(&self, obs: &[f32; 2], out: &mut [f64]) {
-        for (out, &x) in out.iter_mut().zip(obs) {
-            *out = f64::from(x);
-        }
+        widen(obs, out);
     }
 }
 

@@ -48,7 +48,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, ActionSpace, Env, Field, FieldKind, Schema, Step};
+use crate::mdp::{Action, ActionSpace, Env, Field, Schema, Step, widen};
 
 const MIN_POSITION: f64 = -1.2;
 const MAX_POSITION: f64 = 0.6;
@@ -202,20 +202,20 @@ impl Env for MountainCarContinuous {
     }
 
     fn schema(&self) -> Schema {
-        // The bounds of the space are float32.
-        let field = |name, doc, low: f64, high: f64| {
-            let (low, high) = (f64::from(low as f32), f64::from(high as f32));
-            Field { name, kind: FieldKind::Float, doc, low, high }
-        };
         Schema {
             fields: vec![
-                field(
+                Field::float(
                     "position",
                     "position of the car; the goal is at 0.45, the valley's floor at -0.5236",
                     MIN_POSITION,
                     MAX_POSITION,
                 ),
-                field("velocity", "velocity of the car, position per step", -MAX_SPEED, MAX_SPEED),
+                Field::float(
+                    "velocity",
+                    "velocity of the car, position per step",
+                    -MAX_SPEED,
+                    MAX_SPEED,
+                ),
             ],
             facts: Vec::new(),
             actions: self.actions.names(),
@@ -225,9 +225,7 @@ impl Env for MountainCarContinuous {
 
     #[inline]
     fn fields(&self, obs: &[f32; 2], out: &mut [f64]) {
-        for (out, &x) in out.iter_mut().zip(obs) {
-            *out = f64::from(x);
-        }
+        widen(obs, out);
     }
 }
 

@@ -53,7 +53,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, ActionSpace, Env, Field, FieldKind, Schema, Step};
+use crate::mdp::{Action, ActionSpace, Env, Field, Schema, Step, widen};
 
 /// rad/s.
 const MAX_SPEED: f64 = 8.0;
@@ -154,18 +154,11 @@ impl Env for Pendulum {
     }
 
     fn schema(&self) -> Schema {
-        let field = |name, doc, bound: f64| Field {
-            name,
-            kind: FieldKind::Float,
-            doc,
-            low: -bound,
-            high: bound,
-        };
         Schema {
             fields: vec![
-                field("cos", "cosine of the angle from upright", 1.0),
-                field("sin", "sine of the angle from upright", 1.0),
-                field("dot", "angular velocity, rad/s", MAX_SPEED),
+                Field::symmetric("cos", "cosine of the angle from upright", 1.0),
+                Field::symmetric("sin", "sine of the angle from upright", 1.0),
+                Field::symmetric("dot", "angular velocity, rad/s", MAX_SPEED),
             ],
             facts: Vec::new(),
             actions: self.actions.names(),
@@ -175,9 +168,7 @@ impl Env for Pendulum {
 
     #[inline]
     fn fields(&self, obs: &[f32; 3], out: &mut [f64]) {
-        for (out, &x) in out.iter_mut().zip(obs) {
-            *out = f64::from(x);
-        }
+        widen(obs, out);
     }
 }
 

@@ -160,6 +160,25 @@ impl Field {
     pub const fn int(name: &'static str, doc: &'static str, low: usize, high: usize) -> Self {
         Self { name, kind: FieldKind::Int, doc, low: low as f64, high: high as f64 }
     }
+
+    /// A real number of a `Box` of float32, whose bounds are float32 themselves.
+    pub const fn float(name: &'static str, doc: &'static str, low: f64, high: f64) -> Self {
+        let (low, high) = (low as f32 as f64, high as f32 as f64);
+        Self { name, kind: FieldKind::Float, doc, low, high }
+    }
+
+    /// The same from `-bound` to `bound`.
+    pub const fn symmetric(name: &'static str, doc: &'static str, bound: f64) -> Self {
+        Self::float(name, doc, -bound, bound)
+    }
+}
+
+/// Writes an array of float32 into `out`: [`Env::fields`] where the observation is the state.
+#[inline]
+pub fn widen<const N: usize>(obs: &[f32; N], out: &mut [f64]) {
+    for (out, &x) in out.iter_mut().zip(obs) {
+        *out = f64::from(x);
+    }
 }
 
 /// The fields of an environment's states, and the facts that are the same in all of them.

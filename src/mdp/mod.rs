@@ -13,5 +13,7 @@ pub mod math;
 pub mod numpy;
 pub mod streams;
 
-pub use env::{Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step};
+pub use env::{
+    Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, widen,
+};
 pub use finite::{FiniteEnv, FiniteMdp, FiniteMdpError, FiniteState, Outcome};

@@ -6,7 +6,7 @@ use crate::env::error::EnvError;
 use crate::env::kwargs::{KwargKind, KwargSpec, Kwargs};
 use crate::env::registered::{Example, Registered};
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, ActionSpace, Env, Field, FieldKind, Schema, Step};
+use crate::mdp::{Action, ActionSpace, Env, Field, Schema, Step, widen};
 
 /// The values of the argument `shaping`.
 const SHAPINGS: [&str; 2] = ["native", "none"];
@@ -43,11 +43,6 @@ impl Env for LunarLander {
     }
 
     fn schema(&self) -> Schema {
-        let field = |name, doc, low: f64, high: f64| {
-            let (low, high) = (f64::from(low as f32), f64::from(high as f32));
-            Field { name, kind: FieldKind::Float, doc, low, high }
-        };
-        let both = |name, doc, bound: f64| field(name, doc, -bound, bound);
         let turn = 2.0 * std::f64::consts::PI;
         let actions = if self.mission.continuous {
             self.actions.names()
@@ -56,14 +51,28 @@ impl Env for LunarLander {
         };
         Schema {
             fields: vec![
-                both("x", "position from the pad's middle, in half widths (10 m)", 2.5),
-                both("y", "height of the legs over the pad, in half heights (6.67 m)", 2.5),
-                both("x_dot", "horizontal velocity, 5 m/s", 10.0),
-                both("y_dot", "vertical velocity, 7.5 m/s", 10.0),
-                both("angle", "angle from upright, positive to the left, rad", turn),
-                both("angle_dot", "angular velocity, 2.5 rad/s", 10.0),
-                field("left_leg", "1 if Gymnasium's first leg touches the ground", -0.0, 1.0),
-                field("right_leg", "1 if Gymnasium's second leg touches the ground", -0.0, 1.0),
+                Field::symmetric("x", "position from the pad's middle, in half widths (10 m)", 2.5),
+                Field::symmetric(
+                    "y",
+                    "height of the legs over the pad, in half heights (6.67 m)",
+                    2.5,
+                ),
+                Field::symmetric("x_dot", "horizontal velocity, 5 m/s", 10.0),
+                Field::symmetric("y_dot", "vertical velocity, 7.5 m/s", 10.0),
+                Field::symmetric("angle", "angle from upright, positive to the left, rad", turn),
+                Field::symmetric("angle_dot", "angular velocity, 2.5 rad/s", 10.0),
+                Field::float(
+                    "left_leg",
+                    "1 if Gymnasium's first leg touches the ground",
+                    -0.0,
+                    1.0,
+                ),
+                Field::float(
+                    "right_leg",
+                    "1 if Gymnasium's second leg touches the ground",
+                    -0.0,
+                    1.0,
+                ),
             ],
             facts: Vec::new(),
             actions,
@@ -73,9 +82,7 @@ impl Env for LunarLander {
 
     #[inline]
     fn fields(&self, obs: &[f32; 8], out: &mut [f64]) {
-        for (out, &x) in out.iter_mut().zip(obs) {
-            *out = f64::from(x);
-        }
+        widen(obs, out);
     }
 }
 
