@@ -13,7 +13,7 @@ use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
 use super::plan::{Callback, DiscretiserSpec, Expectation, PhiOn, Plan, SeedList, Variant};
 use super::source::{hex, tokens};
 use super::value::Value;
-use super::world::{clipping_warning, dims, example_bins};
+use super::world::{clipping_warning, dims, example_bins, physical_bins};
 use crate::env::{AnyEnv, EnvSpec};
 use crate::learn::AgentConfig;
 use crate::shaping::{Dim, Scale};
@@ -113,6 +113,7 @@ impl Resolver<'_> {
             None => Vec::new(),
         };
         let discretiser = self.discretiser(draft, &agent, spec, &any, &normalise)?;
+        warnings.extend(physical_bins(draft, &schema, &normalise));
         if let Some(clip) = &setting.clip_reward {
             let warning = clipping_warning(clip);
             if !warnings.contains(&warning) {

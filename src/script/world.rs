@@ -1,7 +1,7 @@
 //! What an experiment says about its world: environment, actions, bins.
 
 use super::diagnostic::{Diagnostic, suggest};
-use super::draft::{BinDraft, ExperimentDraft, Located};
+use super::draft::{BinDraft, DiscretiserDraft, ExperimentDraft, Located};
 use super::resolve::Resolver;
 use super::setting::ActionsDraft;
 use crate::env::{self, AnyEnv, EnvConfig, EnvError, EnvSpec};
@@ -43,6 +43,35 @@ impl Resolver<'_> {
             }
         }
     }
+}
+
+/// Bins of a normalised field that go far beyond what it is normalised to: they seem to be in
+/// physical units.
+pub(super) fn physical_bins(
+    draft: &ExperimentDraft,
+    schema: &Schema,
+    normalise: &[Scale],
+) -> Option<Diagnostic> {
+    let Some(DiscretiserDraft::Bins(bins)) = draft.discretiser.as_ref().map(|d| &d.value) else {
+        return None;
+    };
+    let field = |bin: &BinDraft| match &bin.field {
+        Ok(name) => schema.fields.iter().position(|f| f.name == name),
+        Err(i) => Some(*i),
+    };
+    let far = |bin: &&BinDraft| {
+        let is_normalised = field(bin).is_some_and(|f| normalise.iter().any(|s| s.field == f));
+        is_normalised && bin.lo.abs().max(bin.hi.abs()) > 2.0
+    };
+    let bin = bins.iter().find(far)?;
+    Some(
+        Diagnostic::warning("the discretiser sees a normalised field from -1 to 1")
+            .at(bin.spot.place())
+            .note(format!(
+                "these bins go from {} to {}: nearly all of them stay empty",
+                bin.lo, bin.hi
+            )),
+    )
 }
 
 pub(super) fn clipping_warning(clip: &Located<[f64; 2]>) -> Diagnostic {
