@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::record::EpisodeRow;
 use crate::learn::{Agent, Last};
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Ending, Env, Step};
+use crate::mdp::{Action, Ending, Env, Step};
 use crate::shaping::{Discretiser, Fault, Potential, RewardModel, Transition, potential_term};
 
 /// Everything an agent meets, seen through a discretiser and a reward model.
@@ -104,6 +104,29 @@ where
     Ok(())
 }
 
+/// Plays `action` up to `times` more, to the end of the episode at most, and adds the rewards up in
+/// `s`. Returns how often it was played.
+///
+/// Out of line, so that the step of an episode without skipped frames stays the one that the
+/// compiler puts into the loop.
+#[cold]
+#[inline(never)]
+fn repeat<E: Env>(
+    env: &mut E,
+    action: Action,
+    times: u32,
+    s: &mut Step<E::Obs>,
+    rng: &mut NumpyRng,
+) -> u32 {
+    let mut played = 0;
+    while played < times && !s.terminated {
+        let more = env.step(action, rng);
+        *s = Step { reward: s.reward + more.reward, ..more };
+        played += 1;
+    }
+    played
+}
+
 /// One episode. The error is a fault (or `None` for an interruption) and its step.
 #[inline]
 fn play<E, D, P, R, A>(
@@ -138,13 +161,9 @@ where
         let failed = |f| (Some(f), step);
         let mut s = env.step(action, rng);
         frames += 1;
-        for _ in 1..limits.frame_skip {
-            if s.terminated || frames >= max_steps {
-                break;
-            }
-            let more = env.step(action, rng);
-            frames += 1;
-            s = Step { reward: s.reward + more.reward, ..more };
+        if limits.frame_skip > 1 {
+            let left = limits.frame_skip.min(max_steps - frames + 1) - 1;
+            frames += repeat(env, action, left, &mut s, rng);
         }
         let truncated = !s.terminated && frames >= max_steps;
         let next = discretiser.cell(env, &s.obs).map_err(failed)?;

@@ -35,7 +35,11 @@ impl Tabular {
     }
 
     /// Chooses an action in `s` by the present values.
-    #[inline]
+    #[inline(always)]
+    #[expect(
+        clippy::inline_always,
+        reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
+    )]
     pub(super) fn choose(&mut self, s: usize) -> Action {
         self.behaviour.choose(self.q.row(s))
     }
