@@ -20,6 +20,8 @@ import sys
 import time
 from pathlib import Path
 
+from run import make_python
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 
@@ -112,20 +114,6 @@ def measure_peer(args):
     else:
         rate = envpool_rate(id, float(seconds))
     print(json.dumps(rate))
-
-
-def target():
-    return Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-
-
-def make_python():
-    venv = target() / "peers-venv"
-    python = venv / "bin" / "python"
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
-        requirements = str(HERE / "requirements.txt")
-        subprocess.run([str(python), "-m", "pip", "install", "-q", "-r", requirements], check=True)
-    return python
 
 
 def peer(python, *what):
