@@ -9,6 +9,7 @@
 
 mod env;
 mod finite;
+mod finite_env;
 pub mod math;
 pub mod numpy;
 pub mod streams;
@@ -16,4 +17,5 @@ pub mod streams;
 pub use env::{
     Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, widen,
 };
-pub use finite::{FiniteEnv, FiniteMdp, FiniteMdpError, FiniteState, Outcome};
+pub use finite::{FiniteMdp, FiniteMdpError, Outcome};
+pub use finite_env::{FiniteEnv, FiniteState};
