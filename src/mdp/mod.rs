@@ -14,6 +14,7 @@ pub mod numpy;
 pub mod streams;
 
 pub use env::{
-    Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, widen,
+    Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, angle,
+    widen, within,
 };
 pub use finite::{FiniteEnv, FiniteMdp, FiniteMdpError, FiniteState, Outcome};
