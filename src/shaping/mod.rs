@@ -1,6 +1,7 @@
 //! What stands between an environment and a learner: rewards, potentials and discretisers.
 //!
-//! - [`Discretiser`]: observation → cell. [`StateIndex`], [`Bins`], [`ScriptedCells`]
+//! - [`Discretiser`]: observation → what the agent sees. [`StateIndex`], [`Bins`],
+//!   [`ScriptedCells`], [`RawFields`]; [`Shield`]: the actions allowed there
 //! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`RawPotential`]
 //! - [`Scale`]: observation normalisation
 //! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
@@ -19,9 +20,12 @@ mod scale;
 
 pub use crate::mdp::MAX_FIELDS;
 pub use bins::{Bins, BinsError, Dim, MAX_CELLS};
-pub use discretiser::{CellFn, Discretiser, ScriptedCells, StateIndex};
+pub use discretiser::{
+    ActionSet, AnyCells, CellFn, Discretiser, Fields, RawFields, ScriptedCells, Seen, Shield,
+    ShieldFn, Shielded, ShieldedCells, StateIndex,
+};
 pub use potential::{
-    AnyPotential, CellPhiFn, CellPotential, NoPotential, PhiFn, Potential, RawPotential,
+    ActionFn, AnyPotential, CellPhiFn, CellPotential, NoPotential, PhiFn, Potential, RawPotential,
     potential_term, shaped_model,
 };
 pub use reward::{

@@ -2,9 +2,11 @@
 //! policy evaluation, Q from V.
 
 mod evaluation;
+mod planned_agent;
 mod policy_iteration;
 mod value_iteration;
 
 pub use evaluation::{PolicyValueError, policy_value};
+pub use planned_agent::PlannedAgent;
 pub use policy_iteration::PolicyIteration;
-pub use value_iteration::{PlannedAgent, Planner, Solution, ValueIteration, q_from_v};
+pub use value_iteration::{Planner, Solution, ValueIteration, q_from_v};

@@ -5,8 +5,8 @@
 //!
 //! When it stops, every value is within `θ γ / (1 − γ)` of the optimum (γ < 1).
 
-use crate::learn::{Agent, Last, QTable, argmax_tol};
-use crate::mdp::{Action, FiniteMdp};
+use crate::learn::QTable;
+use crate::mdp::FiniteMdp;
 
 /// Solves a model.
 pub trait Planner {
@@ -88,55 +88,6 @@ impl Planner for ValueIteration {
 
     fn gamma(&self) -> f64 {
         self.gamma
-    }
-}
-
-/// Plays a planner's greedy policy and learns nothing.
-#[derive(Debug, Clone)]
-pub struct PlannedAgent {
-    solution: Solution,
-    gamma: f64,
-}
-
-impl PlannedAgent {
-    /// Plays greedily with respect to the solution's action values.
-    pub fn new(solution: Solution, gamma: f64) -> Self {
-        Self { solution, gamma }
-    }
-
-    /// What is played.
-    pub fn solution(&self) -> &Solution {
-        &self.solution
-    }
-}
-
-impl Agent for PlannedAgent {
-    #[inline]
-    fn begin(&mut self, s: usize) -> Action {
-        argmax_tol(self.solution.q.row(s))
-    }
-
-    #[inline]
-    fn step(&mut self, _reward: f64, next: usize) -> Action {
-        self.begin(next)
-    }
-
-    fn end(&mut self, _reward: f64, _last: Last) {}
-
-    fn gamma(&self) -> f64 {
-        self.gamma
-    }
-
-    fn bootstraps_when_truncated(&self) -> bool {
-        true
-    }
-
-    fn epsilon(&self) -> f64 {
-        0.0
-    }
-
-    fn q(&self) -> Option<&QTable> {
-        Some(&self.solution.q)
     }
 }
 
