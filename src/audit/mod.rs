@@ -2,7 +2,12 @@
 //!
 //! - [`preservation`]: does the shaped model have the same optimal policies as the plain one, and
 //!   is it shaped by a potential alone?
+//! - [`pathwise()`]: without a model, is every way from a state paid the same?
 
+mod pathwise;
 mod preservation;
 
+pub use pathwise::{
+    Divergence, Path, Pathwise, PathwiseSettings, StepDependence, pathwise, rule_of_three,
+};
 pub use preservation::{Preservation, Verdict, preservation};
