@@ -3,11 +3,14 @@
 //! - [`preservation`]: does the shaped model have the same optimal policies as the plain one, and
 //!   is it shaped by a potential alone?
 //! - [`pathwise()`]: without a model, is every way from a state paid the same?
+//! - [`query()`]: and is what is paid a difference of potentials for any two states?
 
 mod pathwise;
 mod preservation;
+mod query;
 
 pub use pathwise::{
     Divergence, Path, Pathwise, PathwiseSettings, StepDependence, pathwise, rule_of_three,
 };
 pub use preservation::{Preservation, Verdict, preservation};
+pub use query::{Leg, Query, QuerySettings, Witness, query};

@@ -101,6 +101,14 @@ pub fn rule_of_three(n: usize) -> f64 {
     if n == 0 { 1.0 } else { (3.0 / n as f64).min(1.0) }
 }
 
+/// `f`, unless nothing can be said about it.
+pub(super) fn finite(f: f64) -> Result<f64, Fault> {
+    if f.is_finite() {
+        return Ok(f);
+    }
+    Err(Fault(format!("what shaping adds to the reward is not finite: {f}").into()))
+}
+
 /// Two trajectories that should have been paid the same.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Divergence {

@@ -1,7 +1,7 @@
 //! The trajectories of [`pathwise`](super::pathwise): where they start, what is played, what is
 //! paid.
 
-use super::{Path, PathwiseSettings, StepDependence};
+use super::{Path, PathwiseSettings, StepDependence, finite};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::streams::Stream;
 use crate::mdp::{Action, Ending, Env, MAX_FIELDS, Step};
@@ -217,10 +217,7 @@ impl<'a, F> Player<'a, F> {
     where
         F: FnMut(&E, &Transition<'_, E::Obs>) -> Result<f64, Fault>,
     {
-        match (self.f)(env, t)? {
-            f if f.is_finite() => Ok(f),
-            f => Err(Fault(format!("what shaping adds to the reward is not finite: {f}").into())),
-        }
+        finite((self.f)(env, t)?)
     }
 
     /// Asks what the same transition is paid at other steps of an episode.
