@@ -4,13 +4,20 @@
 //!   is it shaped by a potential alone?
 //! - [`strict`]: is it shaped by a potential, transition by transition? By which, or which two
 //!   episodes prove that there is none ([`Certificate`])?
+//! - [`Advantages`]: is it in expectation? Is the learned reward a multiple of the native one, and
+//!   how far are the two apart?
 
 mod certificate;
+mod expected;
 mod preservation;
+mod scale;
 #[cfg(test)]
 mod specimens;
+mod starc;
 mod strict;
 
 pub use certificate::{Certificate, Walk, WalkStep};
+pub use expected::{Advantages, Expected};
 pub use preservation::{Preservation, Verdict, preservation};
+pub use scale::Scaling;
 pub use strict::{Diagnosis, Difference, Finding, Strict, TerminalPotential, strict};
