@@ -90,12 +90,14 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         Verdict::Inconclusive => None,
     });
     let (verdict, basis) = match (checked.finding, preserved) {
-        (Finding::Holds, Some(true)) if potential_only => {
-            (AuditVerdict::PotentialBased, "exact: Q_F + Φ = Q and the greedy sets are equal".into())
-        }
-        (Finding::Holds, Some(true)) => {
-            (AuditVerdict::PotentialBased, "exact: every transition agrees with one potential".into())
-        }
+        (Finding::Holds, Some(true)) if potential_only => (
+            AuditVerdict::PotentialBased,
+            "exact: Q_F + Φ = Q and the greedy sets are equal".into(),
+        ),
+        (Finding::Holds, Some(true)) => (
+            AuditVerdict::PotentialBased,
+            "exact: every transition agrees with one potential".into(),
+        ),
         (Finding::Fails, Some(true)) => {
             (AuditVerdict::NotPotentialBased, "exact: the greedy sets are equal".into())
         }

@@ -76,7 +76,11 @@ pub struct Audit {
 }
 
 impl Audit {
-    fn new(verdict: AuditVerdict, policy_preserved: Option<bool>, basis: impl Into<String>) -> Self {
+    fn new(
+        verdict: AuditVerdict,
+        policy_preserved: Option<bool>,
+        basis: impl Into<String>,
+    ) -> Self {
         Self {
             verdict,
             policy_preserved,
