@@ -9,6 +9,7 @@
 //! - [`pattern`]: what kind of term is it, if it is no potential's?
 //! - [`pathwise()`]: without a model, is every way from a state paid the same?
 //! - [`query()`]: and is what is paid a difference of potentials for any two states?
+//! - [`sampled()`]: a finite model of a discretised environment, from samples of each cell
 
 mod certificate;
 mod expected;
@@ -16,6 +17,7 @@ mod pathwise;
 mod pattern;
 mod preservation;
 mod query;
+mod sampled;
 mod scale;
 #[cfg(test)]
 mod specimens;
@@ -30,5 +32,6 @@ pub use pathwise::{
 pub use pattern::{Pattern, pattern};
 pub use preservation::{Preservation, Verdict, preservation};
 pub use query::{Leg, Query, QuerySettings, Witness, query};
+pub use sampled::{Asked, CellOf, ExtraOf, PhiOf, Sampled, SampledSettings, cell_ranges, sampled};
 pub use scale::Scaling;
 pub use strict::{Diagnosis, Difference, Finding, Strict, TerminalPotential, strict};
