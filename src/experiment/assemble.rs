@@ -296,6 +296,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let setup = Setup {
                 n_states: n_cells,
                 n_actions: env.n_actions(),
+                seed,
                 stream: Stream::new(seed, "agent"),
                 initial_q,
             };
