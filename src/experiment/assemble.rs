@@ -286,7 +286,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
     seed: u64,
 ) -> Result<(AnyAgent, Vec<f64>), Fault> {
     match variant.agent.spec.build {
-        Build::Learner(build) => {
+        Build::Learner(build) | Build::Predictor(build) => {
             let initial_q = match variant.agent_functions.get("initial_q") {
                 Some(f) => {
                     Some(of_action(host, variant, env, n_cells, f, "the initial action value")?)
@@ -298,6 +298,8 @@ pub(super) fn agent<E: Env + Clone + 'static>(
                 n_actions: env.n_actions(),
                 stream: Stream::new(seed, "agent"),
                 initial_q,
+                initial_v: None,
+                policy: None,
             };
             Ok((build(&variant.agent, setup), Vec::new()))
         }

@@ -1,7 +1,8 @@
 //! Agents that learn by playing, and planners that solve a model.
 //!
 //! - [`Agent`], [`Learn`]: chooses actions and learns from rewards; [`QLearning`], [`Sarsa`],
-//!   [`RandomAgent`]
+//!   [`MonteCarlo`], [`OffPolicyMonteCarlo`], [`RandomAgent`]
+//! - [`prediction`]: the state values of a policy that is given
 //! - [`planning`]: value iteration, exact policy evaluation, Q from V on a [`FiniteMdp`]
 //! - [`registry`]: the one place where an agent is registered; [`AgentConfig`] is its configuration
 //! - [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what they are made of
@@ -12,21 +13,29 @@
 //! [`FiniteMdp`]: crate::mdp::FiniteMdp
 
 mod agent;
+mod episode;
 mod greedy;
+mod monte_carlo;
+mod off_policy_monte_carlo;
 mod params;
 pub mod planning;
+pub mod prediction;
 mod q_learning;
 mod q_table;
 mod random_agent;
 pub mod registry;
 mod sarsa;
 mod schedule;
+mod step_size;
 mod tabular;
 
 pub use agent::{Agent, Last, Learn, Seen};
+pub use episode::Visits;
 pub use greedy::{
     Behaviour, argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed,
 };
+pub use monte_carlo::MonteCarlo;
+pub use off_policy_monte_carlo::OffPolicyMonteCarlo;
 pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
 pub use q_learning::QLearning;
 pub use q_table::QTable;
@@ -34,4 +43,5 @@ pub use random_agent::RandomAgent;
 pub use registry::{AgentSpec, AnyAgent};
 pub use sarsa::Sarsa;
 pub use schedule::{Schedule, ScheduleState, Unit};
+pub use step_size::{AlphaSource, Rate, StepSize};
 pub use tabular::td_error;

@@ -17,6 +17,8 @@ pub enum ParamValue {
     Float(f64),
     /// A schedule.
     Schedule(Schedule),
+    /// True or false.
+    Bool(bool),
     /// One of several words.
     Word(&'static str),
     /// A script's function, which the script host keeps.
@@ -28,6 +30,7 @@ impl std::fmt::Display for ParamValue {
         match self {
             Self::Int(n) => write!(f, "{n}"),
             Self::Float(x) => write!(f, "{x:?}"),
+            Self::Bool(yes) => write!(f, "{yes}"),
             Self::Word(word) => write!(f, "{word:?}"),
             Self::Function => write!(f, "a function"),
             Self::Schedule(Schedule::Constant { value }) => write!(f, "{value:?}"),
@@ -71,6 +74,8 @@ pub enum ParamKind {
         /// Whether 0 is excluded.
         open: bool,
     },
+    /// True or false.
+    Bool,
     /// One of these words.
     Word(&'static [&'static str]),
 }
@@ -79,6 +84,7 @@ impl ParamKind {
     /// What is allowed, in words.
     pub fn allowed(&self) -> String {
         match *self {
+            Self::Bool => "true or false".into(),
             Self::Word(words) => {
                 let quoted: Vec<String> = words.iter().map(|w| format!("{w:?}")).collect();
                 quoted.join(" or ")
@@ -112,7 +118,8 @@ impl ParamKind {
                 (above && number <= max && number.is_finite()).then_some(ParamValue::Float(number))
             }
             (Self::Int { min }, ParamValue::Int(n)) => (n >= min).then_some(value),
-            (Self::Word(_) | Self::Int { .. }, _) => None,
+            (Self::Bool, ParamValue::Bool(_)) => Some(value),
+            (Self::Bool | Self::Word(_) | Self::Int { .. }, _) => None,
             (Self::Rate { open }, _) => {
                 let schedule = match value {
                     ParamValue::Schedule(schedule) => schedule,
@@ -211,6 +218,16 @@ impl AgentConfig {
             ParamValue::Word(word) => word,
             _ => unreachable!("{name} is a word"),
         }
+    }
+
+    /// Whether it has a switch of this name, and the switch is on.
+    pub fn is_on(&self, name: &str) -> bool {
+        self.params.get(name) == Some(&ParamValue::Bool(true))
+    }
+
+    /// Whether it learns the state values of a policy that is given.
+    pub fn is_predictor(&self) -> bool {
+        matches!(self.spec.build, Build::Predictor(_))
     }
 
     /// Whether it plans on a model instead of learning from steps.

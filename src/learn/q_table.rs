@@ -57,6 +57,12 @@ impl QTable {
         &mut self.values[s * self.n_actions + a]
     }
 
+    /// The value of an entry, by its number in row-major order, to change it.
+    #[inline]
+    pub fn entry_mut(&mut self, entry: usize) -> &mut f64 {
+        &mut self.values[entry]
+    }
+
     /// max over a of Q(s, a).
     #[inline]
     pub fn max(&self, s: usize) -> f64 {
