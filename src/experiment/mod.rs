@@ -16,7 +16,9 @@ mod execute;
 pub mod golden;
 mod landscape;
 pub mod play;
+mod predict;
 mod record;
+mod starts;
 mod store;
 mod train;
 mod unit;
@@ -34,7 +36,8 @@ pub use audit::{Audit, audit_variant};
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use landscape::{Landscape, ListedState};
-pub use record::{EpisodeRow, Learned, UnitRecord};
+pub use predict::has_exact_values;
+pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
 pub use store::{
     Store, StoreError, StoredUnit, read_table, write_atomically, write_atomically_with,
 };
