@@ -2,15 +2,18 @@
 //!
 //! `G ← γ G + R`, `Q(S, A) ← Q(S, A) + α [G − Q(S, A)]`, from the episode's last step to its first,
 //! for the first visit of (S, A) in the episode or for every one. With α = 1 / N(S, A) the value is
-//! the mean of the returns. The policy is ε-greedy and changes between episodes only.
+//! the mean of the returns. The policy changes between episodes only.
 
 use super::episode::{Episode, Visits};
 use super::greedy::pick_allowed;
-use super::{Agent, AlphaSource, Behaviour, Last, Learn, QTable, Rate, Schedule, Seen, StepSize};
+use super::{
+    Agent, AlphaSource, Behaviour, Exploration, Explore, Last, Learn, QTable, Rate, Schedule, Seen,
+    StepSize,
+};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
-/// Monte Carlo control, ε-greedy.
+/// Monte Carlo control.
 ///
 /// Deviation 1: the book's episodes end. One that the time limit cuts off counts with the rewards
 /// that it had: there is nothing to bootstrap from.
@@ -27,20 +30,23 @@ pub struct MonteCarlo {
 }
 
 impl MonteCarlo {
-    /// A learner with the table `q`; exploration draws from `stream`.
+    /// A learner with the table `q`; `behaviour` is the policy and the schedule of its ε, and draws
+    /// from `stream`.
     pub fn new(
         q: QTable,
         gamma: f64,
         alpha: AlphaSource,
-        epsilon: Schedule,
+        behaviour: (Exploration, Schedule),
         visits: Visits,
         stream: Stream,
     ) -> Self {
         let n_entries = q.values().len();
+        let (exploration, epsilon) = behaviour;
+        let shape = [q.n_states(), q.n_actions()];
         Self {
             gamma,
             alpha: StepSize::new(alpha, n_entries),
-            behaviour: Behaviour::new(epsilon, stream),
+            behaviour: Behaviour::new(exploration, epsilon, shape, stream),
             visits,
             starts: None,
             episode: Episode::new(n_entries),
@@ -58,7 +64,8 @@ impl MonteCarlo {
     /// `a` is what is played in `s`.
     #[inline]
     fn play<S: Seen>(&mut self, s: S, a: Action) -> Action {
-        self.episode.visit(s.cell() * self.q.n_actions() + a);
+        self.behaviour.played(s.cell(), a);
+        self.episode.visit(self.q.pair(s.cell(), a));
         a
     }
 }
@@ -104,7 +111,7 @@ impl<S: Seen> Learn<S> for MonteCarlo {
         let Self { episode, q, alpha, .. } = self;
         episode.returns(self.gamma, self.visits, |entry, g| {
             let alpha = alpha.visit(entry);
-            let value = q.entry_mut(entry);
+            let value = &mut q.values_mut()[entry];
             *value += alpha * (g - *value);
         });
         self.alpha.end_episode();
@@ -121,8 +128,8 @@ mod tests {
 
     fn learner(alpha: AlphaSource, visits: Visits) -> MonteCarlo {
         let q = QTable::from_values(2, vec![0.0, 1.0, 4.0, 2.0]);
-        let epsilon = Schedule::constant(0.0);
-        MonteCarlo::new(q, 0.5, alpha, epsilon, visits, Stream::new(0, "test"))
+        let behaviour = (Exploration::EpsilonGreedy, Schedule::constant(0.0));
+        MonteCarlo::new(q, 0.5, alpha, behaviour, visits, Stream::new(0, "test"))
     }
 
     /// (0, 1) for 2, (1, 0) for 4, (0, 1) for 8 and the end: returns 6, 8, 8.

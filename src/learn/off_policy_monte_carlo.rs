@@ -10,7 +10,7 @@
 //! Hence it learns from the tails of episodes only, from the last exploring action on.
 
 use super::greedy::argmax_allowed;
-use super::{Agent, Behaviour, Last, Learn, QTable, Schedule, Seen};
+use super::{Agent, EpsilonGreedy, Explore, Last, Learn, QTable, Schedule, Seen};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 use crate::shaping::{ActionSet, Shielded};
@@ -34,7 +34,7 @@ pub struct OffPolicyMonteCarlo {
     /// The sum of the weights so far, one per entry of `q`.
     weights: Vec<f64>,
     gamma: f64,
-    behaviour: Behaviour,
+    behaviour: EpsilonGreedy,
     episode: Vec<Decision>,
 }
 
@@ -45,7 +45,7 @@ impl OffPolicyMonteCarlo {
             weights: vec![0.0; q.values().len()],
             q,
             gamma,
-            behaviour: Behaviour::new(epsilon, stream),
+            behaviour: EpsilonGreedy::new(epsilon, stream),
             episode: Vec::new(),
         }
     }
@@ -114,7 +114,7 @@ impl<S: Seen> Learn<S> for OffPolicyMonteCarlo {
         let (mut g, mut w) = (0.0, 1.0);
         for &Decision { s, a, probability, reward } in self.episode.iter().rev() {
             g = reward + self.gamma * g;
-            let weight = &mut self.weights[s.cell * self.q.n_actions() + a];
+            let weight = &mut self.weights[self.q.pair(s.cell, a)];
             *weight += w;
             let value = self.q.get_mut(s.cell, a);
             *value += w / *weight * (g - *value);

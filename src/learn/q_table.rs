@@ -57,10 +57,16 @@ impl QTable {
         &mut self.values[s * self.n_actions + a]
     }
 
-    /// The value of an entry, by its number in row-major order, to change it.
+    /// The place of (s, a) among [`Self::values`].
     #[inline]
-    pub fn entry_mut(&mut self, entry: usize) -> &mut f64 {
-        &mut self.values[entry]
+    pub fn pair(&self, s: usize, a: usize) -> usize {
+        s * self.n_actions + a
+    }
+
+    /// All values, row-major, to change them.
+    #[inline]
+    pub(super) fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
     }
 
     /// max over a of Q(s, a).

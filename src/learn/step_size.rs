@@ -91,9 +91,8 @@ impl Rate for StepSize {
             Self::VisitCount { omega, visits, rates } => {
                 visits[pair] = visits[pair].saturating_add(1);
                 let n = f64::from(visits[pair]);
-                let alpha = if *omega == 1.0 { 1.0 / n } else { pow(n, -*omega) };
-                rates[pair] = alpha;
-                alpha
+                rates[pair] = pow(n, -*omega);
+                rates[pair]
             }
         }
     }

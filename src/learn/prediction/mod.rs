@@ -13,7 +13,7 @@ mod td_lambda;
 pub use monte_carlo::MonteCarloPrediction;
 pub use n_step_td::NStepTd;
 pub use policy::GivenPolicy;
-pub use td_lambda::{TdLambda, Traces};
+pub use td_lambda::TdLambda;
 pub use td0::Td0;
 
 use super::{Agent, AlphaSource, Last, Learn, QTable, Rate, Seen, StepSize};

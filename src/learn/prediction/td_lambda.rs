@@ -5,69 +5,28 @@
 //! state s: `V(s) ← V(s) + α δ e(s)`, `e(s) ← γ λ e(s)`.
 
 use super::{Estimate, Rule};
-use crate::learn::{Last, Rate};
+use crate::learn::control::Traces;
+use crate::learn::{Last, Rate, td_error};
 
-/// Traces below this are dropped: they no longer reach the last digits of a value.
-const FAINT: f64 = 1e-12;
-
-/// What a further visit does to the trace of a state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Traces {
-    /// Adds 1.
-    Accumulating,
-    /// Makes it 1.
-    Replacing,
-}
-
-impl Traces {
-    /// The words that [`Self::of_word`] reads.
-    pub const WORDS: &'static [&'static str] = &["accumulating", "replacing"];
-
-    /// `"replacing"`, else accumulating.
-    pub fn of_word(word: &str) -> Self {
-        if word == "replacing" { Self::Replacing } else { Self::Accumulating }
-    }
-}
-
-/// Temporal-difference prediction with eligibility traces.
-///
-/// Deviation 1: traces that have decayed below 1e-12 are forgotten.
+/// Temporal-difference prediction with eligibility traces, one per state.
 #[derive(Debug, Clone)]
 pub struct TdLambda {
-    lambda: f64,
-    kind: Traces,
     s: usize,
-    /// e, one per state.
-    traces: Vec<f64>,
-    /// The states whose trace is not 0.
-    active: Vec<u32>,
+    traces: Traces,
 }
 
 impl TdLambda {
-    /// With traces over `n_states` that decay by γ `lambda`.
-    pub fn new(lambda: f64, kind: Traces, n_states: usize) -> Self {
-        Self { lambda, kind, s: 0, traces: vec![0.0; n_states], active: Vec::new() }
+    /// With `traces` that decay by γ λ.
+    pub fn new(traces: Traces) -> Self {
+        Self { s: 0, traces }
     }
 
     fn learn(&mut self, estimate: &mut Estimate, reward: f64, next_value: f64) {
-        let error = reward + estimate.gamma * next_value - estimate.v[self.s];
-        let trace = &mut self.traces[self.s];
-        if *trace == 0.0 {
-            self.active.push(self.s as u32);
-        }
-        *trace = if self.kind == Traces::Replacing { 1.0 } else { *trace + 1.0 };
-        estimate.alpha.visit(self.s);
-        let decay = estimate.gamma * self.lambda;
-        let traces = &mut self.traces;
-        self.active.retain(|&s| {
-            let trace = &mut traces[s as usize];
-            estimate.v[s as usize] += estimate.alpha.of(s as usize) * error * *trace;
-            *trace *= decay;
-            if *trace < FAINT {
-                *trace = 0.0;
-            }
-            *trace > 0.0
-        });
+        let Estimate { v, gamma, alpha } = estimate;
+        let delta = td_error(v[self.s], reward, *gamma, next_value);
+        let step = alpha.visit(self.s);
+        self.traces.visit(self.s);
+        self.traces.learn(v, delta, step, alpha);
     }
 }
 
@@ -75,7 +34,7 @@ impl Rule for TdLambda {
     const BOOTSTRAPS: bool = true;
 
     fn begin(&mut self, _estimate: &mut Estimate, s: usize) {
-        self.active.drain(..).for_each(|s| self.traces[s as usize] = 0.0);
+        self.traces.clear();
         self.s = s;
     }
 
@@ -94,12 +53,14 @@ mod tests {
     use super::super::Td0;
     use super::super::tests::{HALF, after};
     use super::*;
+    use crate::learn::control::Trace;
 
     const V: [f64; 3] = [1.0, 4.0, 9.0];
     const REWARDS: [f64; 3] = [2.0, 4.0, 8.0];
 
-    fn play(lambda: f64, kind: Traces) -> Vec<f64> {
-        let rule = TdLambda::new(lambda, kind, 3);
+    /// γ = 1/2.
+    fn play(lambda: f64, kind: Trace) -> Vec<f64> {
+        let rule = TdLambda::new(Traces::new(kind, 0.5 * lambda, 0.0, 3));
         after(rule, &V, HALF, &[0, 1, 0], &REWARDS, Last::Terminated)
     }
 
@@ -108,27 +69,27 @@ mod tests {
         // γλ = 1/4. δ = 3: V(0) = 2.5, e(0) = 1/4. δ = 4 + 1.25 - 4 = 1.25: V(1) = 4.625, V(0) =
         // 2.5 + 1.25/8 = 2.65625, e = (1/16, 1/4). δ = 8 - 2.65625 = 5.34375: V(1) += 5.34375/8,
         // V(0) += 5.34375/2 · (1 + 1/16), or · 1 for replacing traces.
-        let v = play(0.5, Traces::Accumulating);
+        let v = play(0.5, Trace::Accumulating);
         assert_eq!(v, [2.65625 + 2.671_875 * 1.0625, 4.625 + 0.667_968_75, 9.0]);
-        let v = play(0.5, Traces::Replacing);
+        let v = play(0.5, Trace::Replacing);
         assert_eq!(v, [2.65625 + 2.671_875, 4.625 + 0.667_968_75, 9.0]);
     }
 
     #[test]
     fn without_traces_it_is_td0() {
         let td0 = after(Td0::default(), &V, HALF, &[0, 1, 0], &REWARDS, Last::Terminated);
-        assert_eq!(play(0.0, Traces::Accumulating), td0);
-        assert_eq!(play(0.0, Traces::Replacing), td0);
+        assert_eq!(play(0.0, Trace::Accumulating), td0);
+        assert_eq!(play(0.0, Trace::Replacing), td0);
     }
 
     #[test]
     fn traces_do_not_reach_into_the_next_episode() {
-        let mut rule = TdLambda::new(1.0, Traces::Accumulating, 3);
+        let mut rule = TdLambda::new(Traces::new(Trace::Accumulating, 1.0, 0.0, 3));
         let mut estimate = Estimate::new(vec![0.0; 3], 1.0, HALF);
-        rule.begin(&mut estimate, 0);
-        rule.end(&mut estimate, 1.0, Last::Terminated);
-        rule.begin(&mut estimate, 1);
-        rule.end(&mut estimate, 1.0, Last::Terminated);
+        for s in [0, 1] {
+            rule.begin(&mut estimate, s);
+            rule.end(&mut estimate, 1.0, Last::Terminated);
+        }
         assert_eq!(estimate.v, [0.5, 0.5, 0.0]);
     }
 }

@@ -1,14 +1,15 @@
 //! Agents that learn action values from the returns of whole episodes.
 
-use super::shared::{ALPHA, EPSILON, GAMMA, INITIAL_Q, VISITS};
+use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, STEP_SIZE, VISITS};
 use super::{AgentSpec, AnyAgent, Build};
-use crate::learn::{
-    AlphaSource, MonteCarlo, OffPolicyMonteCarlo, ParamKind, ParamSpec, ParamValue, Visits,
-};
+use crate::learn::{MonteCarlo, OffPolicyMonteCarlo, ParamKind, ParamSpec, ParamValue, Visits};
 use crate::mdp::streams::Stream;
 
+/// The mean of the returns.
+const MEAN: ParamSpec = ParamSpec { default: ParamValue::VisitCount { omega: 1.0 }, ..STEP_SIZE };
+
 /// The switch that makes episodes start anywhere.
-pub(super) const EXPLORING_STARTS: ParamSpec = ParamSpec {
+const EXPLORING_STARTS: ParamSpec = ParamSpec {
     name: "exploring_starts",
     kind: ParamKind::Bool,
     function: None,
@@ -18,26 +19,22 @@ pub(super) const EXPLORING_STARTS: ParamSpec = ParamSpec {
 
 pub(super) const MONTE_CARLO: AgentSpec = AgentSpec {
     name: "monte_carlo",
-    doc: "on-policy Monte Carlo control, ε-greedy (Sutton & Barto 5.3, 5.4)",
-    params: &[ALPHA, GAMMA, EPSILON, VISITS, EXPLORING_STARTS, INITIAL_Q],
+    doc: "on-policy Monte Carlo control (Sutton & Barto 5.3, 5.4)",
+    params: &[MEAN, GAMMA, EPSILON, EXPLORATION, VISITS, EXPLORING_STARTS, INITIAL_Q],
     build: Build::Learner(|c, mut setup| {
         let table = setup.table(c);
-        // A stream of their own: the behaviour's must not depend on how episodes start.
-        let starts = c.is_on(EXPLORING_STARTS.name).then(|| {
-            let mut behaviour = setup.stream.clone();
-            Stream::new(behaviour.next_u64(), "first actions")
-        });
         let agent = MonteCarlo::new(
             table,
             c.float("gamma"),
-            AlphaSource::Schedule(c.schedule("alpha")),
-            c.schedule("epsilon"),
+            c.alpha(),
+            (c.exploration(), c.schedule("epsilon")),
             Visits::of_word(c.word("visits")),
             setup.stream,
         );
-        AnyAgent::tabular(match starts {
-            Some(starts) => agent.with_exploring_starts(starts),
-            None => agent,
+        AnyAgent::tabular(if c.is_on(EXPLORING_STARTS.name) {
+            agent.with_exploring_starts(Stream::new(setup.seed, "first actions"))
+        } else {
+            agent
         })
     }),
 };

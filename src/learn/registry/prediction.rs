@@ -1,12 +1,13 @@
 //! Agents that learn the state values of a policy that is given.
 
-use super::shared::{ALPHA, ANY, GAMMA, UNIT, VISITS};
+use super::control::{LAMBDA, TRACE_CUTOFF, TRACES, traces};
+use super::shared::{ANY, GAMMA, STEP_SIZE, VISITS};
 use super::{AgentSpec, AnyAgent, Build, Setup};
 use crate::learn::prediction::{
-    Estimate, MonteCarloPrediction, NStepTd, Prediction, Rule, Td0, TdLambda, Traces,
+    Estimate, MonteCarloPrediction, NStepTd, Prediction, Rule, Td0, TdLambda,
 };
 use crate::learn::registry::TabularAgent;
-use crate::learn::{AgentConfig, AlphaSource, ParamKind, ParamSpec, ParamValue, Signature, Visits};
+use crate::learn::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature, Visits};
 
 const POLICY: ParamSpec = ParamSpec {
     name: "policy",
@@ -30,8 +31,7 @@ where
     Prediction<R>: TabularAgent,
 {
     let v = setup.initial_v.take().unwrap_or_else(|| vec![c.float("initial_v"); setup.n_states]);
-    let alpha = AlphaSource::Schedule(c.schedule("alpha"));
-    let estimate = Estimate::new(v, c.float("gamma"), alpha);
+    let estimate = Estimate::new(v, c.float("gamma"), c.alpha());
     let rule = rule(setup.n_states);
     AnyAgent::tabular(Prediction::new(estimate, setup.given_policy(), rule))
 }
@@ -39,7 +39,7 @@ where
 pub(super) const MC_PREDICTION: AgentSpec = AgentSpec {
     name: "mc_prediction",
     doc: "V of a given policy by Monte Carlo (Sutton & Barto 5.1)",
-    params: &[POLICY, ALPHA, GAMMA, VISITS, INITIAL_V],
+    params: &[POLICY, STEP_SIZE, GAMMA, VISITS, INITIAL_V],
     build: Build::Predictor(|c, setup| {
         let visits = Visits::of_word(c.word("visits"));
         predictor(c, setup, |n_states| MonteCarloPrediction::new(visits, n_states))
@@ -49,36 +49,16 @@ pub(super) const MC_PREDICTION: AgentSpec = AgentSpec {
 pub(super) const TD0: AgentSpec = AgentSpec {
     name: "td0",
     doc: "V of a given policy by TD(0) (Sutton 1988; Sutton & Barto 6.1)",
-    params: &[POLICY, ALPHA, GAMMA, INITIAL_V],
+    params: &[POLICY, STEP_SIZE, GAMMA, INITIAL_V],
     build: Build::Predictor(|c, setup| predictor(c, setup, |_| Td0::default())),
 };
 
 pub(super) const TD_LAMBDA: AgentSpec = AgentSpec {
     name: "td_lambda",
     doc: "V of a given policy by TD(λ) (Sutton 1988; Sutton & Barto 12.2)",
-    params: &[
-        POLICY,
-        ALPHA,
-        GAMMA,
-        ParamSpec {
-            name: "lambda",
-            kind: UNIT,
-            function: None,
-            default: ParamValue::Float(0.9),
-            doc: "decay of the eligibility traces, beside gamma",
-        },
-        ParamSpec {
-            name: "traces",
-            kind: ParamKind::Word(Traces::WORDS),
-            function: None,
-            default: ParamValue::Word("accumulating"),
-            doc: "whether a further visit adds 1 to a state's trace or makes it 1",
-        },
-        INITIAL_V,
-    ],
+    params: &[POLICY, STEP_SIZE, GAMMA, LAMBDA, TRACES, TRACE_CUTOFF, INITIAL_V],
     build: Build::Predictor(|c, setup| {
-        let (lambda, traces) = (c.float("lambda"), Traces::of_word(c.word("traces")));
-        predictor(c, setup, |n_states| TdLambda::new(lambda, traces, n_states))
+        predictor(c, setup, |n_states| TdLambda::new(traces(c, n_states)))
     }),
 };
 
@@ -87,7 +67,7 @@ pub(super) const N_STEP_TD: AgentSpec = AgentSpec {
     doc: "V of a given policy by n-step TD (Sutton & Barto 7.1)",
     params: &[
         POLICY,
-        ALPHA,
+        STEP_SIZE,
         GAMMA,
         ParamSpec {
             name: "n",
