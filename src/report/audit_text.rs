@@ -111,7 +111,10 @@ fn exactly(exact: &Exact, audit: &Audit, lines: &mut Lines) {
     if let Some(earned) = &audit.true_return {
         lines.item(
             "true return",
-            &format!("{:.4} of an optimal policy, {:.4} of one that is optimal for the shaped reward", earned.optimal, earned.shaped),
+            &format!(
+                "{:.4} of an optimal policy, {:.4} of one that is optimal for the shaped reward",
+                earned.optimal, earned.shaped
+            ),
         );
     }
     changed(exact, lines);
@@ -252,9 +255,8 @@ fn changed(exact: &Exact, lines: &mut Lines) {
         return;
     }
     lines.item("changes", "greedy actions, without > with shaping:");
-    let names = |set: &[usize]| {
-        set.iter().map(|&a| naming.action(a)).collect::<Vec<_>>().join(" or ")
-    };
+    let names =
+        |set: &[usize]| set.iter().map(|&a| naming.action(a)).collect::<Vec<_>>().join(" or ");
     for &s in compared.states_changed.iter().take(LISTED) {
         lines.more(&format!(
             "{}: {} > {}",
@@ -268,7 +270,12 @@ fn changed(exact: &Exact, lines: &mut Lines) {
     }
 }
 
-fn drawn(grid: &Grid, changed: &[usize], plain: &[Vec<usize>], shaped: &[Vec<usize>]) -> Vec<String> {
+fn drawn(
+    grid: &Grid,
+    changed: &[usize],
+    plain: &[Vec<usize>],
+    shaped: &[Vec<usize>],
+) -> Vec<String> {
     let arrows = |set: &[usize]| set.iter().map(|&a| grid.arrows[a]).collect::<String>();
     let cols = grid.rows.first().map_or(0, |row| row.chars().count());
     let cell = |s: usize, tile: char| {

@@ -6,9 +6,7 @@ use super::finite::settings;
 use super::learned::Learned;
 use super::named::Naming;
 use super::{Audit, AuditVerdict, Thorough};
-use crate::audit::{
-    Pathwise, SampledSettings, cell_ranges, pathwise, preservation, sampled,
-};
+use crate::audit::{Pathwise, SampledSettings, cell_ranges, pathwise, preservation, sampled};
 use crate::experiment::assemble::middle;
 use crate::mdp::Env;
 use crate::script::{DiscretiserSpec, Host, Variant};
@@ -71,14 +69,15 @@ pub(super) fn model<E: Env + Clone + 'static>(
     }
     let schema = env.schema();
     let middle = middle(&schema);
-    let ranges: Vec<[f64; 2]> = schema
-        .fields
-        .iter()
-        .zip(middle)
-        .map(|(f, middle)| {
-            if f.low.is_finite() && f.high.is_finite() { [f.low, f.high] } else { [middle; 2] }
-        })
-        .collect();
+    let ranges: Vec<[f64; 2]> =
+        schema
+            .fields
+            .iter()
+            .zip(middle)
+            .map(|(f, middle)| {
+                if f.low.is_finite() && f.high.is_finite() { [f.low, f.high] } else { [middle; 2] }
+            })
+            .collect();
     let gamma = variant.agent.float("gamma");
     let settings = SampledSettings {
         n_cells: cells,

@@ -7,8 +7,8 @@ use super::named::Naming;
 use super::replacement::replacement;
 use super::{Audit, AuditVerdict};
 use crate::audit::{
-    Advantages, Expected, Finding, Pathwise, PathwiseSettings, Pattern, Preservation, Scaling, Strict, pathwise, pattern,
-    preservation, strict,
+    Advantages, Expected, Finding, Pathwise, PathwiseSettings, Pattern, Preservation, Scaling,
+    Strict, pathwise, pattern, preservation, strict,
 };
 use crate::experiment::assemble::{NotAModelError, learned_model};
 use crate::experiment::shielded::playable;

@@ -4,12 +4,16 @@
 //! A family of agents has a file of its own with a constant per agent, which [`AGENTS`] lists.
 
 mod control;
+mod monte_carlo;
 mod planners;
+mod prediction;
 mod shared;
 
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
+use super::prediction::GivenPolicy;
 use super::{Learn, QLearning, QTable, Sarsa};
+use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 use crate::shaping::Shielded;
 
@@ -26,6 +30,10 @@ pub struct Setup {
     pub stream: Stream,
     /// Initial action values, shape `[n_states, n_actions]`, where a script gives them.
     pub initial_q: Option<Vec<f64>>,
+    /// Initial state values, shape `[n_states]`, where a script gives them.
+    pub initial_v: Option<Vec<f64>>,
+    /// What a predictor plays in each state, shape `[n_states]`; anything if there is nothing.
+    pub policy: Option<Vec<Action>>,
 }
 
 impl Setup {
@@ -36,6 +44,14 @@ impl Setup {
             None => QTable::new(self.n_states, self.n_actions, config.float("initial_q")),
         }
     }
+
+    /// What a predictor plays.
+    fn given_policy(self) -> GivenPolicy {
+        match self.policy {
+            Some(actions) => GivenPolicy::Fixed(actions),
+            None => GivenPolicy::Random { n_actions: self.n_actions, stream: self.stream },
+        }
+    }
 }
 
 /// How an agent comes to be.
@@ -43,6 +59,8 @@ impl Setup {
 pub enum Build {
     /// A learner.
     Learner(fn(&AgentConfig, Setup) -> AnyAgent),
+    /// A learner of the state values of a policy that is given.
+    Predictor(fn(&AgentConfig, Setup) -> AnyAgent),
     /// A planner, which needs the environment's finite model.
     Planner(fn(&AgentConfig) -> Box<dyn Planner>),
 }
@@ -119,6 +137,12 @@ impl AnyAgent {
 pub static AGENTS: &[AgentSpec] = &[
     control::Q_LEARNING,
     control::SARSA,
+    monte_carlo::MONTE_CARLO,
+    monte_carlo::OFF_POLICY_MONTE_CARLO,
+    prediction::MC_PREDICTION,
+    prediction::TD0,
+    prediction::TD_LAMBDA,
+    prediction::N_STEP_TD,
     control::EXPECTED_SARSA,
     control::DOUBLE_Q_LEARNING,
     control::N_STEP_SARSA,
