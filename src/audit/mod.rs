@@ -6,9 +6,11 @@
 //!   episodes prove that there is none ([`Certificate`])?
 //! - [`Advantages`]: is it in expectation? Is the learned reward a multiple of the native one, and
 //!   how far are the two apart?
+//! - [`broken_task`]: a task on the same dynamics whose optimal policy the shaping changes
 
 mod certificate;
 mod expected;
+mod necessity;
 mod preservation;
 mod scale;
 #[cfg(test)]
@@ -18,6 +20,7 @@ mod strict;
 
 pub use certificate::{Certificate, Walk, WalkStep};
 pub use expected::{Advantages, Expected};
+pub use necessity::{BrokenTask, broken_task};
 pub use preservation::{Preservation, Verdict, preservation};
 pub use scale::Scaling;
 pub use strict::{Diagnosis, Difference, Finding, Strict, TerminalPotential, strict};
