@@ -108,6 +108,6 @@ fn parts_epsilon_greedy(bencher: Bencher, n: usize) {
     let mut i = 0;
     bencher.bench_local(|| {
         i = (i + 1) % 1024;
-        behaviour.choose(&values[i * n..(i + 1) * n])
+        behaviour.choose(&values[i * n..(i + 1) * n], i)
     });
 }

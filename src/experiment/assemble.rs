@@ -2,13 +2,13 @@
 
 use crate::learn::AnyAgent;
 use crate::learn::planning::PlannedAgent;
-use crate::learn::registry::Build;
+use crate::learn::registry::{Build, Setup};
 use crate::mdp::streams::Stream;
 use crate::mdp::{Env, FiniteMdp, Schema};
 use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
 use crate::shaping::{
     AnyPotential, AnyReward, Bins, CellPotential, Fault, MAX_FIELDS, NativeReward, NoPotential,
-    Potential, RawPotential, RewardModel, ScriptedReward, TabulatedReward, Transition,
+    Potential, RawPotential, RewardModel, ScriptedReward, Shield, TabulatedReward, Transition,
     shaped_model,
 };
 
@@ -23,6 +23,82 @@ pub(super) fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
     fields
 }
 
+/// From a cell to the fields of the state that stands for it.
+pub(super) type Representative = Box<dyn Fn(usize) -> [f64; MAX_FIELDS]>;
+
+/// The state that stands for each cell: itself, or the centre of the bins. Scripted cells have
+/// none.
+pub(super) fn representative<E: Env + Clone + 'static>(
+    variant: &Variant,
+    env: &E,
+) -> Option<Representative> {
+    match &variant.discretiser {
+        DiscretiserSpec::StateIndex => {
+            let states = env.clone();
+            Some(Box::new(move |index| {
+                let mut fields = [0.0; MAX_FIELDS];
+                let obs = states.state(index).expect("StateIndex is given to finite states only");
+                states.fields(&obs, &mut fields);
+                fields
+            }))
+        }
+        DiscretiserSpec::Bins(dims) => {
+            let bins = Bins::new(dims).expect("checked when the plan was resolved");
+            let base = middle(&env.schema());
+            Some(Box::new(move |cell| {
+                let mut fields = base;
+                bins.centre(cell, &mut fields);
+                fields
+            }))
+        }
+        DiscretiserSpec::Cells { .. } => None,
+    }
+}
+
+/// The variant's shield, if it has one.
+pub(super) fn shield<E: Env>(host: &Host, variant: &Variant, env: &E) -> Option<Shield> {
+    let schema = env.schema();
+    let allowed = variant.allowed.as_ref()?;
+    let allowed = host.callbacks().shield(allowed, env.n_actions(), &schema);
+    Some(Shield::new(schema.fields.len(), env.n_states().unwrap_or(0), allowed))
+}
+
+/// A number for every cell and action, shape `[n_cells, n_actions]`, called `what` in messages;
+/// 0 in states that cannot be reached.
+pub(super) fn of_action<E: Env + Clone + 'static>(
+    host: &Host,
+    variant: &Variant,
+    env: &E,
+    n_cells: usize,
+    callback: &Callback,
+    what: &'static str,
+) -> Result<Vec<f64>, Fault> {
+    let schema = env.schema();
+    let mut number = host.callbacks().of_action(callback, what, &schema);
+    let fields_of = representative(variant, env).expect("refused when the plan was resolved");
+    let reachable = match variant.discretiser {
+        DiscretiserSpec::StateIndex => env.finite().map(|mdp| mdp.reachable()),
+        _ => None,
+    };
+    let n_actions = env.n_actions();
+    let mut values = vec![0.0; n_cells * n_actions];
+    for (cell, row) in values.chunks_exact_mut(n_actions).enumerate() {
+        if reachable.as_ref().is_some_and(|reachable| !reachable[cell]) {
+            continue;
+        }
+        let fields = fields_of(cell);
+        let fields = &fields[..schema.fields.len()];
+        let of_state = if callback.arity == 1 { Some(number(fields, 0)?) } else { None };
+        for (action, value) in row.iter_mut().enumerate() {
+            *value = match of_state {
+                Some(value) => value,
+                None => number(fields, action)?,
+            };
+        }
+    }
+    Ok(values)
+}
+
 /// How a variant's potential is evaluated: on the states themselves, on bin centres, or raw.
 pub(super) fn potential<E: Env + Clone + 'static>(
     host: &Host,
@@ -34,39 +110,37 @@ pub(super) fn potential<E: Env + Clone + 'static>(
     let schema = env.schema();
     let n_fields = schema.fields.len();
     let mut phi = host.callbacks().potential(callback, &schema);
-    let potential = match (&variant.discretiser, variant.potential_on) {
-        (DiscretiserSpec::StateIndex, _) => {
-            let states = env.clone();
-            let mut at = move |index: usize| {
-                let mut fields = [0.0; MAX_FIELDS];
-                let obs = states.state(index).expect("StateIndex is given to finite states only");
-                states.fields(&obs, &mut fields);
-                phi(&fields[..n_fields])
-            };
-            // Reachable states at once, so that a mistake shows before training; the others, which
-            // may be junk, never. Without a model nobody knows which those are.
-            let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
-            let mut table = vec![f64::NAN; n_cells];
-            for (index, _) in reachable.iter().enumerate().filter(|(_, r)| **r) {
-                table[index] = at(index)?;
-            }
-            CellPotential::partial(table, Box::new(at))
+    let fields_of = match variant.potential_on {
+        PhiOn::Raw if !matches!(variant.discretiser, DiscretiserSpec::StateIndex) => None,
+        _ => representative(variant, env),
+    };
+    let Some(fields_of) = fields_of else {
+        return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi)));
+    };
+    let mut at = move |cell: usize| phi(&fields_of(cell)[..n_fields]);
+    let potential = if let DiscretiserSpec::StateIndex = variant.discretiser {
+        // Reachable states at once, so that a mistake shows before training; the others, which may
+        // be junk, never. Without a model nobody knows which those are.
+        let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
+        let mut table = vec![f64::NAN; n_cells];
+        for (index, _) in reachable.iter().enumerate().filter(|(_, r)| **r) {
+            table[index] = at(index)?;
         }
-        (DiscretiserSpec::Bins(dims), PhiOn::Cell) => {
-            let bins = Bins::new(dims).expect("checked when the plan was resolved");
-            let base = middle(&schema);
-            CellPotential::new(
-                n_cells,
-                Box::new(move |cell| {
-                    let mut fields = base;
-                    bins.centre(cell, &mut fields);
-                    phi(&fields[..n_fields])
-                }),
-            )
-        }
-        _ => return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi))),
+        CellPotential::partial(table, Box::new(at))
+    } else {
+        CellPotential::new(n_cells, Box::new(at))
     };
     Ok(AnyPotential::Cell(potential))
+}
+
+/// A variant's reward model, asked step by step.
+pub(super) fn scripted_reward<E: Env>(host: &Host, variant: &Variant, env: &E) -> AnyReward<E> {
+    if variant.reward.is_none() && variant.terms.is_empty() {
+        return AnyReward::Native(NativeReward);
+    }
+    let terms: Vec<Callback> = variant.terms.values().cloned().collect();
+    let reward = host.callbacks().reward(variant.reward.as_ref(), &terms, &env.schema());
+    AnyReward::Scripted(ScriptedReward::<E>(reward))
 }
 
 /// A variant's reward model. On finite environments it is tabulated, unless it reads `t.step`.
@@ -75,18 +149,14 @@ pub(super) fn reward<E: Env + Clone + 'static>(
     variant: &Variant,
     env: &E,
 ) -> Result<AnyReward<E>, Fault> {
-    if variant.reward.is_none() && variant.terms.is_empty() {
+    let AnyReward::Scripted(mut scripted) = scripted_reward(host, variant, env) else {
         return Ok(AnyReward::Native(NativeReward));
-    }
-    let schema = env.schema();
-    let terms: Vec<Callback> = variant.terms.values().cloned().collect();
+    };
     let callbacks = host.callbacks();
-    let mut scripted =
-        ScriptedReward::<E>(callbacks.reward(variant.reward.as_ref(), &terms, &schema));
     // Over several frames the last outcome alone does not determine the reward.
     if let (Some(mdp), 1) = (env.finite(), variant.frame_skip) {
         callbacks.clear_step_read();
-        let table = tabulate(env, mdp, terms.len(), &mut scripted)?;
+        let table = tabulate(env, mdp, variant.terms.len(), &mut scripted)?;
         if !callbacks.step_read() {
             return Ok(AnyReward::Tabulated(table));
         }
@@ -223,8 +293,19 @@ pub(super) fn agent<E: Env + Clone + 'static>(
 ) -> Result<(AnyAgent, Vec<f64>), Fault> {
     match variant.agent.spec.build {
         Build::Learner(build) => {
-            let stream = Stream::new(seed, "agent");
-            Ok((build(&variant.agent, n_cells, env.n_actions(), stream), Vec::new()))
+            let initial_q = match variant.agent_functions.get("initial_q") {
+                Some(f) => {
+                    Some(of_action(host, variant, env, n_cells, f, "the initial action value")?)
+                }
+                None => None,
+            };
+            let setup = Setup {
+                n_states: n_cells,
+                n_actions: env.n_actions(),
+                stream: Stream::new(seed, "agent"),
+                initial_q,
+            };
+            Ok((build(&variant.agent, setup), Vec::new()))
         }
         Build::Planner(build) => {
             let planner = build(&variant.agent);
@@ -232,7 +313,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
             let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
             let sweeps = solution.changes.clone();
-            Ok((AnyAgent::Planned(PlannedAgent::new(solution, planner.gamma())), sweeps))
+            Ok((AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma())), sweeps))
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::record::EpisodeRow;
-use crate::learn::{Agent, Last};
+use crate::learn::{Last, Learn, Seen};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Ending, Env, Step};
 use crate::shaping::{Discretiser, Fault, Potential, RewardModel, Transition, potential_term};
@@ -67,7 +67,8 @@ pub enum TrainError {
 /// Steps between looks at the stop flag in an endless episode.
 const STOP_INTERVAL: u32 = 1 << 16;
 
-/// Plays `limits.episodes` episodes, teaching `agent`; calls `each` after every one.
+/// Plays `limits.episodes` episodes, teaching `agent`; calls `each` after every one,
+/// with the agent as it is by then.
 ///
 /// The reward learned from is `reward(t) + γΦ(s′) − Φ(s)`, with Φ(s′) = 0 on termination. On
 /// truncation Φ(s′) is kept if and only if the agent bootstraps from s′: both sides must speak of
@@ -81,14 +82,14 @@ pub fn train<E, D, P, R, A>(
     limits: Limits,
     rng: &mut NumpyRng,
     stop: &AtomicBool,
-    mut each: impl FnMut(EpisodeRow),
+    mut each: impl FnMut(EpisodeRow, &A),
 ) -> Result<(), TrainError>
 where
     E: Env,
     D: Discretiser<E>,
     P: Potential<E>,
     R: RewardModel<E>,
-    A: Agent,
+    A: Learn<D::State>,
 {
     for episode in 0..limits.episodes {
         if stop.load(Ordering::Relaxed) {
@@ -96,7 +97,7 @@ where
         }
         match play(world, agent, limits, rng, stop) {
             Ok(row) if !row.learned.is_finite() => return Err(TrainError::NotFinite { episode }),
-            Ok(row) => each(row),
+            Ok(row) => each(row, agent),
             Err((None, _)) => return Err(TrainError::Interrupted),
             Err((Some(fault), step)) => return Err(TrainError::Fault { fault, episode, step }),
         }
@@ -141,7 +142,7 @@ where
     D: Discretiser<E>,
     P: Potential<E>,
     R: RewardModel<E>,
-    A: Agent,
+    A: Learn<D::State>,
 {
     let World { env, discretiser, potential, reward } = world;
     let max_steps = limits.max_steps.unwrap_or(u32::MAX);
@@ -152,9 +153,9 @@ where
     let (mut native, mut learned, mut shaping) = (0.0, 0.0, 0.0);
 
     let mut obs = env.reset(rng);
-    let cell = discretiser.cell(env, &obs).map_err(|f| (Some(f), 0))?;
-    let mut phi = potential.phi(env, cell, &obs).map_err(|f| (Some(f), 0))?;
-    let mut action = agent.begin(cell);
+    let start = discretiser.see(env, &obs).map_err(|f| (Some(f), 0))?;
+    let mut phi = potential.phi(env, start.cell(), &obs).map_err(|f| (Some(f), 0))?;
+    let mut action = agent.begin(start);
     // Steps of the agent, and of the environment.
     let (mut step, mut frames) = (0u32, 0u32);
     loop {
@@ -166,7 +167,6 @@ where
             frames += repeat(env, action, left, &mut s, rng);
         }
         let truncated = !s.terminated && frames >= max_steps;
-        let next = discretiser.cell(env, &s.obs).map_err(failed)?;
         let t = Transition {
             state: &obs,
             action,
@@ -180,11 +180,15 @@ where
         if let Some([low, high]) = limits.clip_reward {
             r = r.clamp(low, high);
         }
+        // A terminal state is seen by nobody: scripts need not have a cell or an action for it.
+        let next =
+            if s.terminated { None } else { Some(discretiser.see(env, &s.obs).map_err(failed)?) };
         if P::ACTIVE {
-            let phi_next = if s.terminated || (truncated && !keep_truncated) {
-                0.0
-            } else {
-                potential.phi(env, next, &s.obs).map_err(failed)?
+            let phi_next = match next {
+                Some(next) if keep_truncated || !truncated => {
+                    potential.phi(env, next.cell(), &s.obs).map_err(failed)?
+                }
+                _ => 0.0,
             };
             let f = potential_term(gamma, phi, phi_next);
             r += f;
@@ -194,23 +198,25 @@ where
         native += s.reward;
         learned += r;
         step += 1;
-        if s.terminated || truncated {
-            let (last, ending) = if s.terminated {
-                (Last::Terminated, Ending::Terminated)
-            } else {
-                (Last::Truncated(next), Ending::Truncated)
-            };
-            agent.end(r, last);
-            return Ok(EpisodeRow {
-                steps: step,
-                native,
-                learned,
-                shaping,
-                terms,
-                epsilon,
-                ending,
-            });
-        }
+        let next = match next {
+            Some(next) if !truncated => next,
+            last => {
+                let (last, ending) = match last {
+                    None => (Last::Terminated, Ending::Terminated),
+                    Some(next) => (Last::Truncated(next), Ending::Truncated),
+                };
+                agent.end(r, last);
+                return Ok(EpisodeRow {
+                    steps: step,
+                    native,
+                    learned,
+                    shaping,
+                    terms,
+                    epsilon,
+                    ending,
+                });
+            }
+        };
         if step.is_multiple_of(STOP_INTERVAL) && stop.load(Ordering::Relaxed) {
             return Err((None, step));
         }

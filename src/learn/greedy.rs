@@ -6,7 +6,7 @@
 //! largest count as tied, and the first of the tied is taken.
 
 use super::q_table::max;
-use super::{QTable, Schedule, ScheduleState};
+use super::{QTable, Schedule, ScheduleState, Seen};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
@@ -25,6 +25,43 @@ fn threshold(row: &[f64]) -> f64 {
 pub fn argmax_tol(row: &[f64]) -> Action {
     let threshold = threshold(row);
     row.iter().position(|&q| q >= threshold).unwrap_or(0)
+}
+
+/// The largest value among the actions that `s` allows.
+#[inline]
+pub fn max_allowed<S: Seen>(row: &[f64], s: S) -> f64 {
+    if !S::SHIELDED {
+        return max(row);
+    }
+    let mut best = f64::NEG_INFINITY;
+    for (a, &q) in row.iter().enumerate() {
+        if s.allows(a) && q > best {
+            best = q;
+        }
+    }
+    best
+}
+
+/// [`argmax_tol`] among the actions that `s` allows.
+#[inline]
+pub fn argmax_allowed<S: Seen>(row: &[f64], s: S) -> Action {
+    if !S::SHIELDED {
+        return argmax_tol(row);
+    }
+    let best = max_allowed(row, s);
+    let threshold = best - TIE * best.abs().max(1.0);
+    (0..row.len()).find(|&a| s.allows(a) && row[a] >= threshold).unwrap_or(0)
+}
+
+/// The action that `u` in [0, 1) picks from those that `s` allows, each with the same probability.
+#[inline]
+pub fn pick_allowed<S: Seen>(n_actions: usize, s: S, u: f64) -> Action {
+    if !S::SHIELDED {
+        return ((u * n_actions as f64) as usize).min(n_actions - 1);
+    }
+    let n = (0..n_actions).filter(|&a| s.allows(a)).count();
+    let k = ((u * n as f64) as usize).min(n.saturating_sub(1));
+    (0..n_actions).filter(|&a| s.allows(a)).nth(k).unwrap_or(0)
 }
 
 /// All actions within the tie tolerance of the largest, in order. `scale` widens the tolerance to
@@ -55,17 +92,18 @@ impl Behaviour {
         Self { epsilon: ScheduleState::new(schedule), stream }
     }
 
-    /// Chooses: with probability ε an action uniformly at random, else [`argmax_tol`].
+    /// Chooses among the actions that `s` allows: with probability ε uniformly at random, else by
+    /// [`argmax_tol`].
     #[inline]
-    pub fn choose(&mut self, row: &[f64]) -> Action {
+    pub fn choose<S: Seen>(&mut self, row: &[f64], s: S) -> Action {
         let epsilon = self.epsilon.value();
         let u = self.stream.uniform();
         self.epsilon.step();
         if u < epsilon {
             // Given u < ε, u / ε is uniform in [0, 1): it picks the action without another draw.
-            ((u / epsilon * row.len() as f64) as usize).min(row.len() - 1)
+            pick_allowed(row.len(), s, u / epsilon)
         } else {
-            argmax_tol(row)
+            argmax_allowed(row, s)
         }
     }
 
@@ -105,7 +143,7 @@ mod tests {
         let mut b = Behaviour::new(Schedule::constant(0.4), Stream::new(1, "test"));
         let mut counts = [0u32; 4];
         for _ in 0..100_000 {
-            counts[b.choose(&[0.0, 1.0, 0.0, 0.0])] += 1;
+            counts[b.choose(&[0.0, 1.0, 0.0, 0.0], 0)] += 1;
         }
         // Each other action: 10 %, standard deviation 95; the greedy one 70 %.
         for a in [0, 2, 3] {
@@ -119,8 +157,8 @@ mod tests {
         let mut explorer = Behaviour::new(Schedule::constant(1.0), Stream::new(3, "test"));
         let mut miser = Behaviour::new(Schedule::constant(0.0), Stream::new(3, "test"));
         for _ in 0..100 {
-            explorer.choose(&[0.0, 1.0]);
-            miser.choose(&[0.0, 1.0]);
+            explorer.choose(&[0.0, 1.0], 0);
+            miser.choose(&[0.0, 1.0], 0);
         }
         assert_eq!(explorer.stream.next_u64(), miser.stream.next_u64());
     }

@@ -1,6 +1,7 @@
 //! Agents that learn by playing, and planners that solve a model.
 //!
-//! - [`Agent`]: chooses actions and learns from rewards; [`QLearning`], [`Sarsa`], [`RandomAgent`]
+//! - [`Agent`], [`Learn`]: chooses actions and learns from rewards; [`QLearning`], [`Sarsa`],
+//!   [`RandomAgent`]
 //! - [`planning`]: value iteration, policy iteration, exact policy evaluation on a [`FiniteMdp`]
 //! - [`registry`]: the one place where an agent is registered; [`AgentConfig`] is its configuration
 //! - [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what they are made of
@@ -12,6 +13,7 @@
 
 mod agent;
 mod greedy;
+mod params;
 pub mod planning;
 mod q_learning;
 mod q_table;
@@ -21,12 +23,15 @@ mod sarsa;
 mod schedule;
 mod tabular;
 
-pub use agent::{Agent, Last};
-pub use greedy::{Behaviour, argmax_tol, greedy_set, greedy_sets};
+pub use agent::{Agent, Last, Learn, Seen};
+pub use greedy::{
+    Behaviour, argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed,
+};
+pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
 pub use q_learning::QLearning;
 pub use q_table::QTable;
 pub use random_agent::RandomAgent;
-pub use registry::{AgentConfig, AgentSpec, AnyAgent, ParamValue};
+pub use registry::{AgentSpec, AnyAgent};
 pub use sarsa::Sarsa;
 pub use schedule::{Schedule, ScheduleState, Unit};
 pub use tabular::td_error;

@@ -5,8 +5,9 @@
 //! The book's order: choose A from S, observe R and S′, update, and only then choose the next
 //! action, from the updated values.
 
+use super::greedy::max_allowed;
 use super::tabular::Tabular;
-use super::{Agent, Last, QTable, Schedule};
+use super::{Agent, Last, Learn, QTable, Schedule, Seen};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
@@ -22,32 +23,6 @@ impl QLearning {
 }
 
 impl Agent for QLearning {
-    #[inline]
-    fn begin(&mut self, s: usize) -> Action {
-        let a = self.0.choose(s);
-        self.0.play(s, a)
-    }
-
-    #[inline(always)]
-    #[expect(
-        clippy::inline_always,
-        reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
-    )]
-    fn step(&mut self, reward: f64, next: usize) -> Action {
-        let max_next = self.0.q.max(next);
-        self.0.update(reward, max_next);
-        self.begin(next)
-    }
-
-    fn end(&mut self, reward: f64, last: Last) {
-        let max_next = match last {
-            Last::Terminated => 0.0,
-            Last::Truncated(next) => self.0.q.max(next),
-        };
-        self.0.update(reward, max_next);
-        self.0.end_episode();
-    }
-
     fn gamma(&self) -> f64 {
         self.0.gamma
     }
@@ -62,6 +37,34 @@ impl Agent for QLearning {
 
     fn q(&self) -> Option<&QTable> {
         Some(&self.0.q)
+    }
+}
+
+impl<S: Seen> Learn<S> for QLearning {
+    #[inline]
+    fn begin(&mut self, s: S) -> Action {
+        let a = self.0.choose(s);
+        self.0.play(s, a)
+    }
+
+    #[inline(always)]
+    #[expect(
+        clippy::inline_always,
+        reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
+    )]
+    fn step(&mut self, reward: f64, next: S) -> Action {
+        let max_next = max_allowed(self.0.q.row(next.cell()), next);
+        self.0.update(reward, max_next);
+        self.begin(next)
+    }
+
+    fn end(&mut self, reward: f64, last: Last<S>) {
+        let max_next = match last {
+            Last::Terminated => 0.0,
+            Last::Truncated(next) => max_allowed(self.0.q.row(next.cell()), next),
+        };
+        self.0.update(reward, max_next);
+        self.0.end_episode();
     }
 }
 
@@ -96,7 +99,7 @@ mod tests {
     fn termination_cuts_the_target_and_truncation_does_not() {
         let mut agent = greedy_learner();
         agent.begin(0);
-        agent.end(2.0, Last::Terminated);
+        agent.end(2.0, Last::<usize>::Terminated);
         assert_eq!(agent.0.q.get(0, 1), 1.0 + 0.5 * (2.0 - 1.0));
         let mut agent = greedy_learner();
         agent.begin(0);

@@ -5,7 +5,7 @@
 //! The book's order: A′ is chosen from S′ *before* the update, and is the action that is played.
 
 use super::tabular::Tabular;
-use super::{Agent, Last, QTable, Schedule};
+use super::{Agent, Last, Learn, QTable, Schedule, Seen};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
@@ -24,35 +24,6 @@ impl Sarsa {
 }
 
 impl Agent for Sarsa {
-    #[inline]
-    fn begin(&mut self, s: usize) -> Action {
-        let a = self.0.choose(s);
-        self.0.play(s, a)
-    }
-
-    #[inline(always)]
-    #[expect(
-        clippy::inline_always,
-        reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
-    )]
-    fn step(&mut self, reward: f64, next: usize) -> Action {
-        let a_next = self.0.choose(next);
-        self.0.update(reward, self.0.q.get(next, a_next));
-        self.0.play(next, a_next)
-    }
-
-    fn end(&mut self, reward: f64, last: Last) {
-        let q_next = match last {
-            Last::Terminated => 0.0,
-            Last::Truncated(next) => {
-                let a_next = self.0.choose(next);
-                self.0.q.get(next, a_next)
-            }
-        };
-        self.0.update(reward, q_next);
-        self.0.end_episode();
-    }
-
     fn gamma(&self) -> f64 {
         self.0.gamma
     }
@@ -70,6 +41,37 @@ impl Agent for Sarsa {
     }
 }
 
+impl<S: Seen> Learn<S> for Sarsa {
+    #[inline]
+    fn begin(&mut self, s: S) -> Action {
+        let a = self.0.choose(s);
+        self.0.play(s, a)
+    }
+
+    #[inline(always)]
+    #[expect(
+        clippy::inline_always,
+        reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
+    )]
+    fn step(&mut self, reward: f64, next: S) -> Action {
+        let a_next = self.0.choose(next);
+        self.0.update(reward, self.0.q.get(next.cell(), a_next));
+        self.0.play(next, a_next)
+    }
+
+    fn end(&mut self, reward: f64, last: Last<S>) {
+        let q_next = match last {
+            Last::Terminated => 0.0,
+            Last::Truncated(next) => {
+                let a_next = self.0.choose(next);
+                self.0.q.get(next.cell(), a_next)
+            }
+        };
+        self.0.update(reward, q_next);
+        self.0.end_episode();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -84,7 +86,7 @@ mod tests {
         // 4 + 0.5 (-20 + 0.9 * 4 - 4) = -6.2.
         assert_eq!(agent.step(-20.0, 1), 0);
         assert_eq!(agent.0.q.get(1, 0), 4.0 + 0.5 * (-20.0 + 0.9 * 4.0 - 4.0));
-        agent.end(1.0, Last::Terminated);
+        agent.end(1.0, Last::<usize>::Terminated);
         let q = 4.0 + 0.5 * (-20.0 + 0.9 * 4.0 - 4.0);
         assert_eq!(agent.0.q.get(1, 0), q + 0.5 * (1.0 - q));
     }

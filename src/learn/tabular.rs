@@ -1,6 +1,6 @@
 //! What tabular one-step learners share: the table, the step size, the behaviour, and (S, A).
 
-use super::{Behaviour, QTable, Schedule, ScheduleState};
+use super::{Behaviour, QTable, Schedule, ScheduleState, Seen};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
@@ -40,14 +40,14 @@ impl Tabular {
         clippy::inline_always,
         reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
     )]
-    pub(super) fn choose(&mut self, s: usize) -> Action {
-        self.behaviour.choose(self.q.row(s))
+    pub(super) fn choose<S: Seen>(&mut self, s: S) -> Action {
+        self.behaviour.choose(self.q.row(s.cell()), s)
     }
 
     /// `a` is what is played in `s`.
     #[inline]
-    pub(super) fn play(&mut self, s: usize, a: Action) -> Action {
-        (self.s, self.a) = (s, a);
+    pub(super) fn play<S: Seen>(&mut self, s: S, a: Action) -> Action {
+        (self.s, self.a) = (s.cell(), a);
         a
     }
 

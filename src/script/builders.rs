@@ -1,5 +1,6 @@
 //! The functions with which a script builds its plan.
 
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, Map, NativeCallContext};
@@ -241,7 +242,11 @@ fn random_map(
 }
 
 fn agent(engine: &mut Engine, context: &Rc<Context>, spec: &'static AgentSpec) {
-    let default = move || AgentDraft { spec, params: AgentConfig::new(spec).params };
+    let default = move || AgentDraft {
+        spec,
+        params: AgentConfig::new(spec).params,
+        functions: BTreeMap::new(),
+    };
     engine.register_fn(spec.name, default);
     let c = context.clone();
     engine.register_fn(spec.name, move |native: NativeCallContext, map: Map| {

@@ -37,6 +37,8 @@ pub(super) struct Located<T> {
 pub(super) struct AgentDraft {
     pub(super) spec: &'static AgentSpec,
     pub(super) params: BTreeMap<&'static str, ParamValue>,
+    /// Parameters that are functions.
+    pub(super) functions: BTreeMap<&'static str, Located<FnPtr>>,
 }
 
 /// `env("FrozenLake-v1", #{ … })`, or a bare id.
@@ -82,6 +84,7 @@ pub(super) struct ExperimentDraft {
     pub(super) potential_raw: bool,
     pub(super) reward: Option<Located<FnPtr>>,
     pub(super) terms: BTreeMap<String, Located<FnPtr>>,
+    pub(super) allowed: Option<Located<FnPtr>>,
     pub(super) notes: Option<String>,
 }
 
@@ -202,6 +205,8 @@ impl ExperimentDraft {
             }
             "reward" if removed => self.reward = None,
             "reward" => self.reward = Some(located(function(key, "(t) -> number", value)?)),
+            "allowed" if removed => self.allowed = None,
+            "allowed" => self.allowed = Some(located(function(key, "(s, a) -> bool", value)?)),
             "terms" if removed => self.terms.clear(),
             "terms" => self.set_terms(value, spot)?,
             "notes" => {

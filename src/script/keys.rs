@@ -60,6 +60,11 @@ pub const KEYS: &[Key] = &[
     ),
     key("reward", "|t| number", "replaces the reward the agent learns from"),
     key("terms", "#{ name: |t| number, .. }", "extra reward terms, each logged under its name"),
+    key(
+        "allowed",
+        "|s, a| bool",
+        "a shield: what it refuses is neither taken nor bootstrapped from",
+    ),
     key("notes", "string", "the rationale, carried into the manifest"),
 ];
 

@@ -1,13 +1,13 @@
 //! Reading typed values out of a script's maps.
 
-use rhai::{Dynamic, Map};
+use rhai::{Dynamic, FnPtr, Map};
 
 use super::diagnostic::{Diagnostic, suggest};
-use super::draft::{AgentDraft, Spot};
+use super::draft::{AgentDraft, Located, Spot, captured_now};
 use super::errors::type_name;
 use super::value::Value;
 use crate::learn::registry::AgentSpec;
-use crate::learn::{ParamValue, Schedule};
+use crate::learn::{ParamKind, ParamValue, Schedule};
 
 /// A value in words, for messages: `"abc"`, `3`, `a function`.
 pub(super) fn show(value: &Dynamic) -> String {
@@ -106,28 +106,45 @@ pub(super) fn merge_agent(
                 .at(place())
                 .maybe_hint(suggest(key, names)));
         };
-        let flat = value.clone().flatten();
-        let raw = if let Ok(n) = flat.as_int() {
-            u64::try_from(n).map_or(ParamValue::Float(n as f64), ParamValue::Int)
-        } else if let Ok(x) = flat.as_float() {
-            ParamValue::Float(x)
-        } else if let Some(schedule) = flat.clone().try_cast::<Schedule>() {
-            ParamValue::Schedule(schedule)
-        } else {
-            ParamValue::Float(f64::NAN)
-        };
-        let accepted = param.kind.accept(raw).ok_or_else(|| {
+        if let (Some(_), Some(f)) = (param.function, value.clone().flatten().try_cast::<FnPtr>()) {
+            let value = captured_now(f);
+            agent.functions.insert(param.name, Located { value, spot: spot(key) });
+            agent.params.insert(param.name, ParamValue::Function);
+            continue;
+        }
+        let accepted = param.kind.accept(raw(value, param.kind)).ok_or_else(|| {
+            let function = match param.function {
+                Some(signature) => format!(", or a function {}", signature.text),
+                None => String::new(),
+            };
             Diagnostic::error(format!(
-                "`{key}` of `{}` is {}, got {}",
+                "`{key}` of `{}` is {}{function}, got {}",
                 spec.name,
                 param.kind.allowed(),
                 show(value)
             ))
             .at(place())
         })?;
+        agent.functions.remove(param.name);
         agent.params.insert(param.name, accepted);
     }
     Ok(())
+}
+
+/// A script's value as a parameter's, NaN if it is nothing that a parameter can be.
+fn raw(value: &Dynamic, kind: ParamKind) -> ParamValue {
+    let flat = value.clone().flatten();
+    if let Ok(n) = flat.as_int() {
+        return u64::try_from(n).map_or(ParamValue::Float(n as f64), ParamValue::Int);
+    }
+    if let Ok(x) = flat.as_float() {
+        return ParamValue::Float(x);
+    }
+    if let (Some(word), ParamKind::Word(words)) = (text(&flat), kind) {
+        let known = words.iter().find(|known| **known == word);
+        return known.map_or(ParamValue::Float(f64::NAN), |word| ParamValue::Word(word));
+    }
+    flat.try_cast::<Schedule>().map_or(ParamValue::Float(f64::NAN), ParamValue::Schedule)
 }
 
 /// The `#{ steps: true }` at the end of a schedule; `spot` finds the place of a key.

@@ -19,6 +19,8 @@ pub struct Callback {
     pub(super) function: String,
     /// Values captured by a closure: its leading arguments.
     pub(super) captures: Vec<Value>,
+    /// How many arguments it takes after those.
+    pub arity: usize,
     /// How it is called in messages: `height`, or `closure`.
     pub label: String,
     /// Where the script hands it over.
@@ -86,6 +88,8 @@ pub struct Variant {
     pub normalise: Vec<Scale>,
     /// The agent.
     pub agent: AgentConfig,
+    /// Functions among its parameters, by their keys.
+    pub agent_functions: BTreeMap<&'static str, Callback>,
     /// State → cell.
     pub discretiser: DiscretiserSpec,
     /// Episodes per seed.
@@ -106,6 +110,8 @@ pub struct Variant {
     pub reward: Option<Callback>,
     /// Extra reward terms by name.
     pub terms: BTreeMap<String, Callback>,
+    /// The shield: which actions may be taken.
+    pub allowed: Option<Callback>,
     /// The rationale, for manifest and report.
     pub notes: Option<String>,
 }
@@ -171,6 +177,8 @@ impl Variant {
         };
         let params: Map<String, Json> =
             self.agent.params.iter().map(|(k, v)| ((*k).into(), serde_json::json!(v))).collect();
+        let functions: Map<String, Json> =
+            self.agent_functions.iter().map(|(k, c)| ((*k).into(), digest(c))).collect();
         let terms: Map<String, Json> =
             self.terms.iter().map(|(k, c)| (k.clone(), digest(c))).collect();
         serde_json::json!({
@@ -191,6 +199,8 @@ impl Variant {
             "potential_on": self.potential.is_some().then_some(self.potential_on),
             "reward": self.reward.as_ref().map(digest),
             "terms": terms,
+            "agent_functions": functions,
+            "allowed": self.allowed.as_ref().map(digest),
         })
     }
 }

@@ -94,6 +94,9 @@ impl<E: Env> Potential<E> for CellPotential {
 /// A function from the state's fields to Φ.
 pub type PhiFn = Box<dyn FnMut(&[f64]) -> Result<f64, Fault>>;
 
+/// A function from the state's fields and an action to a number.
+pub type ActionFn = Box<dyn FnMut(&[f64], usize) -> Result<f64, Fault>>;
+
 /// A potential of the raw observation, evaluated at every visited state.
 pub struct RawPotential {
     n_fields: usize,

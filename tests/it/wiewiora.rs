@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use runner::env::frozen_lake::FrozenLake;
 use runner::env::{AnyEnv, make};
 use runner::experiment::{EpisodeRow, Limits, World, train};
-use runner::learn::{Agent, QLearning, QTable, Sarsa, Schedule};
+use runner::learn::{Learn, QLearning, QTable, Sarsa, Schedule};
 use runner::mdp::Env;
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::streams::Stream;
@@ -37,13 +37,13 @@ fn learn<P, R, A>(potential: P, reward: R, mut agent: A) -> (Vec<(u32, f64)>, QT
 where
     P: Potential<FrozenLake>,
     R: RewardModel<FrozenLake>,
-    A: Agent,
+    A: Learn<usize>,
 {
     let discretiser = StateIndex { n_states: STATES };
     let mut world = World { env: lake(), discretiser, potential, reward };
     let limits = Limits { episodes: 1500, max_steps: Some(100), ..Limits::EPISODE };
     let mut played = Vec::new();
-    let each = |row: EpisodeRow| played.push((row.steps, row.native));
+    let each = |row: EpisodeRow, _: &A| played.push((row.steps, row.native));
     let stop = AtomicBool::new(false);
     assert!(train(&mut world, &mut agent, limits, &mut NumpyRng::from_u64(5), &stop, each).is_ok());
     (played, agent.q().unwrap().clone())

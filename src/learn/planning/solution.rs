@@ -1,7 +1,7 @@
-//! What planners have in common, and the agent that plays what they found.
+//! What planners have in common.
 
 use super::PlanError;
-use crate::learn::{Agent, Last, QTable};
+use crate::learn::QTable;
 use crate::mdp::{Action, FiniteMdp};
 
 /// Solves a model.
@@ -39,53 +39,4 @@ pub struct Solution {
     /// No value is further than this from the optimum; `None` with γ = 1, where no such bound is
     /// known.
     pub bound: Option<f64>,
-}
-
-/// Plays a planner's policy and learns nothing.
-#[derive(Debug, Clone)]
-pub struct PlannedAgent {
-    solution: Solution,
-    gamma: f64,
-}
-
-impl PlannedAgent {
-    /// Plays the solution's policy.
-    pub fn new(solution: Solution, gamma: f64) -> Self {
-        Self { solution, gamma }
-    }
-
-    /// What is played.
-    pub fn solution(&self) -> &Solution {
-        &self.solution
-    }
-}
-
-impl Agent for PlannedAgent {
-    #[inline]
-    fn begin(&mut self, s: usize) -> Action {
-        self.solution.policy[s]
-    }
-
-    #[inline]
-    fn step(&mut self, _reward: f64, next: usize) -> Action {
-        self.begin(next)
-    }
-
-    fn end(&mut self, _reward: f64, _last: Last) {}
-
-    fn gamma(&self) -> f64 {
-        self.gamma
-    }
-
-    fn bootstraps_when_truncated(&self) -> bool {
-        true
-    }
-
-    fn epsilon(&self) -> f64 {
-        0.0
-    }
-
-    fn q(&self) -> Option<&QTable> {
-        Some(&self.solution.q)
-    }
 }

@@ -1,0 +1,220 @@
+//! The parameters of agents: what they admit, their values, and an agent's configuration.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::registry::{AgentSpec, Build};
+use super::{Schedule, Unit};
+
+/// The value of an agent's parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ParamValue {
+    /// A whole number.
+    Int(u64),
+    /// A real number.
+    Float(f64),
+    /// A schedule.
+    Schedule(Schedule),
+    /// One of several words.
+    Word(&'static str),
+    /// A script's function, which the script host keeps.
+    Function,
+}
+
+impl std::fmt::Display for ParamValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Int(n) => write!(f, "{n}"),
+            Self::Float(x) => write!(f, "{x:?}"),
+            Self::Word(word) => write!(f, "{word:?}"),
+            Self::Function => write!(f, "a function"),
+            Self::Schedule(Schedule::Constant { value }) => write!(f, "{value:?}"),
+            Self::Schedule(Schedule::Linear { start, end, over, unit }) => {
+                write!(f, "linear({start:?}, {end:?}, {over}{})", steps(*unit))
+            }
+            Self::Schedule(Schedule::Exponential { start, factor, min, unit }) => {
+                write!(f, "exponential({start:?}, {factor:?}, {min:?}{})", steps(*unit))
+            }
+        }
+    }
+}
+
+/// The option of a schedule that goes by steps.
+fn steps(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Episode => "",
+        Unit::Step => ", #{ steps: true }",
+    }
+}
+
+/// What a parameter admits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ParamKind {
+    /// A finite real number in `min..=max`; `min` itself excluded if `open`.
+    Float {
+        /// Lower limit.
+        min: f64,
+        /// Upper limit.
+        max: f64,
+        /// Whether the lower limit is excluded.
+        open: bool,
+    },
+    /// A whole number of at least `min`.
+    Int {
+        /// Lower limit.
+        min: u64,
+    },
+    /// A number or a schedule whose values stay in `0..=1`; 0 excluded if `open`.
+    Rate {
+        /// Whether 0 is excluded.
+        open: bool,
+    },
+    /// One of these words.
+    Word(&'static [&'static str]),
+}
+
+impl ParamKind {
+    /// What is allowed, in words.
+    pub fn allowed(&self) -> String {
+        match *self {
+            Self::Word(words) => {
+                let quoted: Vec<String> = words.iter().map(|w| format!("{w:?}")).collect();
+                quoted.join(" or ")
+            }
+            Self::Float { min, max, open } => match (min.is_finite(), max.is_finite()) {
+                (true, true) if open => format!("a number above {min} and at most {max}"),
+                (true, true) => format!("a number from {min} to {max}"),
+                (true, false) if open => format!("a number above {min}"),
+                (true, false) => format!("a number of at least {min}"),
+                _ => "a finite number".into(),
+            },
+            Self::Int { min } => format!("a whole number of at least {min}"),
+            Self::Rate { open: false } => "a number from 0 to 1, or a schedule of such".into(),
+            Self::Rate { open: true } => {
+                "a number above 0 and at most 1, or a schedule of such".into()
+            }
+        }
+    }
+
+    /// Whether `value` is allowed; turns a plain number into what the parameter stores.
+    pub fn accept(&self, value: ParamValue) -> Option<ParamValue> {
+        let number = match value {
+            ParamValue::Int(n) => n as f64,
+            ParamValue::Float(x) => x,
+            _ => f64::NAN,
+        };
+        match (*self, value) {
+            (Self::Word(words), ParamValue::Word(word)) => words.contains(&word).then_some(value),
+            (Self::Float { min, max, open }, _) => {
+                let above = if open { number > min } else { number >= min };
+                (above && number <= max && number.is_finite()).then_some(ParamValue::Float(number))
+            }
+            (Self::Int { min }, ParamValue::Int(n)) => (n >= min).then_some(value),
+            (Self::Word(_) | Self::Int { .. }, _) => None,
+            (Self::Rate { open }, _) => {
+                let schedule = match value {
+                    ParamValue::Schedule(schedule) => schedule,
+                    // NaN, of which no range is right, if it is no number.
+                    _ => Schedule::constant(number),
+                };
+                let (low, high) = schedule.range();
+                let above = if open { low > 0.0 } else { low >= 0.0 };
+                (above && high <= 1.0).then_some(ParamValue::Schedule(schedule))
+            }
+        }
+    }
+}
+
+/// What a script's function takes and gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Signature {
+    /// In words: `(s) -> number or (s, a) -> number`.
+    pub text: &'static str,
+    /// How many arguments it may take.
+    pub arities: &'static [usize],
+}
+
+/// A parameter of an agent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParamSpec {
+    /// Its key in the agent's map.
+    pub name: &'static str,
+    /// What it admits.
+    pub kind: ParamKind,
+    /// The functions it may be instead.
+    pub function: Option<Signature>,
+    /// Its value when the key is left out.
+    pub default: ParamValue,
+    /// One line: what it does.
+    pub doc: &'static str,
+}
+
+/// An agent and its resolved parameters, defaults filled in.
+#[derive(Debug, Clone)]
+pub struct AgentConfig {
+    /// Which agent.
+    pub spec: &'static AgentSpec,
+    /// Every parameter of the spec.
+    pub params: BTreeMap<&'static str, ParamValue>,
+}
+
+impl AgentConfig {
+    /// The agent with its defaults.
+    pub fn new(spec: &'static AgentSpec) -> Self {
+        Self { spec, params: spec.params.iter().map(|p| (p.name, p.default)).collect() }
+    }
+
+    /// A numeric parameter.
+    ///
+    /// # Panics
+    /// If the agent has no such parameter: the registry's own mistake.
+    pub fn float(&self, name: &str) -> f64 {
+        match self.params[name] {
+            ParamValue::Float(x) => x,
+            ParamValue::Int(n) => n as f64,
+            _ => unreachable!("{name} is a number"),
+        }
+    }
+
+    /// A whole-number parameter.
+    ///
+    /// # Panics
+    /// If the agent has no such parameter: the registry's own mistake.
+    pub fn int(&self, name: &str) -> u64 {
+        match self.params[name] {
+            ParamValue::Int(n) => n,
+            _ => unreachable!("{name} is a whole number"),
+        }
+    }
+
+    /// A schedule.
+    ///
+    /// # Panics
+    /// If the agent has no such parameter: the registry's own mistake.
+    pub fn schedule(&self, name: &str) -> Schedule {
+        match self.params[name] {
+            ParamValue::Schedule(s) => s,
+            ParamValue::Float(x) => Schedule::constant(x),
+            ParamValue::Int(n) => Schedule::constant(n as f64),
+            _ => unreachable!("{name} is a schedule"),
+        }
+    }
+
+    /// One of several words.
+    ///
+    /// # Panics
+    /// If the agent has no such parameter: the registry's own mistake.
+    pub fn word(&self, name: &str) -> &'static str {
+        match self.params[name] {
+            ParamValue::Word(word) => word,
+            _ => unreachable!("{name} is a word"),
+        }
+    }
+
+    /// Whether it plans on a model instead of learning from steps.
+    pub fn is_planner(&self) -> bool {
+        matches!(self.spec.build, Build::Planner(_))
+    }
+}
