@@ -11,6 +11,7 @@ use crate::audit::{
     preservation, strict,
 };
 use crate::experiment::assemble::{NotAModelError, learned_model};
+use crate::experiment::shielded::playable;
 use crate::learn::planning::{Dynamics, Over};
 use crate::mdp::Env;
 use crate::script::{Host, Variant};
@@ -64,10 +65,9 @@ pub(super) fn judge<E: Env + Clone + 'static>(
 ) -> Result<Audit, Fault> {
     let mdp = env.finite().expect("only asked of finite environments");
     let gamma = variant.agent.float("gamma");
-    let reachable = mdp.reachable();
     let mut exact = Exact {
         gamma,
-        states: reachable.iter().filter(|r| **r).count(),
+        states: 0,
         strict: None,
         expected: None,
         scaling: None,
@@ -87,6 +87,9 @@ pub(super) fn judge<E: Env + Clone + 'static>(
             };
         }
     };
+    let mdp = &playable(host, variant, env, (**mdp).clone())?;
+    let reachable = mdp.reachable();
+    exact.states = reachable.iter().filter(|r| **r).count();
     let added = model.shaped.outcomes().iter().zip(mdp.outcomes());
     let f: Vec<f64> = added.map(|(shaped, plain)| shaped.reward - plain.reward).collect();
     exact.pattern = pattern(mdp, &f, &reachable);

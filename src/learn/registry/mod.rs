@@ -20,7 +20,9 @@ pub struct Setup {
     pub n_states: usize,
     /// Number of actions.
     pub n_actions: usize,
-    /// Its randomness.
+    /// The run's seed, for randomness that is not its behaviour's.
+    pub seed: u64,
+    /// The randomness of its behaviour.
     pub stream: Stream,
     /// Initial action values, shape `[n_states, n_actions]`, where a script gives them.
     pub initial_q: Option<Vec<f64>>,
@@ -114,8 +116,19 @@ impl AnyAgent {
 }
 
 /// Every agent, in the order in which they are listed.
-pub static AGENTS: &[AgentSpec] =
-    &[control::Q_LEARNING, control::SARSA, planners::VALUE_ITERATION, planners::RANDOM_AGENT];
+pub static AGENTS: &[AgentSpec] = &[
+    control::Q_LEARNING,
+    control::SARSA,
+    control::EXPECTED_SARSA,
+    control::DOUBLE_Q_LEARNING,
+    control::N_STEP_SARSA,
+    control::SARSA_LAMBDA,
+    control::Q_LAMBDA,
+    control::DYNA_Q,
+    control::SOFT_Q_LEARNING,
+    planners::VALUE_ITERATION,
+    planners::RANDOM_AGENT,
+];
 
 /// The agent called `name`.
 pub fn find(name: &str) -> Option<&'static AgentSpec> {
