@@ -6,6 +6,8 @@
 //!   episodes prove that there is none ([`Certificate`])?
 //! - [`Advantages`]: is it in expectation? Is the learned reward a multiple of the native one, and
 //!   how far are the two apart?
+//! - [`broken_task`]: a task on the same dynamics whose optimal policy the shaping changes
+//! - [`Scorer`]: what a potential promises, before anything is trained
 //! - [`pattern`]: what kind of term is it, if it is no potential's?
 //! - [`pathwise()`]: without a model, is every way from a state paid the same?
 //! - [`query()`]: and is what is paid a difference of potentials for any two states?
@@ -13,12 +15,14 @@
 
 mod certificate;
 mod expected;
+mod necessity;
 mod pathwise;
 mod pattern;
 mod preservation;
 mod query;
 mod sampled;
 mod scale;
+mod score;
 #[cfg(test)]
 mod specimens;
 mod starc;
@@ -26,6 +30,7 @@ mod strict;
 
 pub use certificate::{Certificate, Walk, WalkStep};
 pub use expected::{Advantages, Expected};
+pub use necessity::{BrokenTask, broken_task};
 pub use pathwise::{
     Divergence, Path, Pathwise, PathwiseSettings, StepDependence, pathwise, rule_of_three,
 };
@@ -34,4 +39,5 @@ pub use preservation::{Preservation, Verdict, preservation};
 pub use query::{Leg, Query, QuerySettings, Witness, query};
 pub use sampled::{Asked, CellOf, ExtraOf, PhiOf, Sampled, SampledSettings, cell_ranges, sampled};
 pub use scale::Scaling;
+pub use score::{DeathAttraction, SCORED_SWEEPS, Score, Scorer, Shift, spearman};
 pub use strict::{Diagnosis, Difference, Finding, Strict, TerminalPotential, strict};

@@ -31,6 +31,11 @@ pub(in crate::audit) struct Recovered {
 }
 
 impl Recovered {
+    /// S, the rewards being of this `magnitude`.
+    pub(in crate::audit) fn scale(&self, magnitude: f64) -> f64 {
+        self.phi.iter().chain(&self.anchors).fold(magnitude, |m, x| m.max(x.abs()))
+    }
+
     /// Φ where a transition leads.
     #[inline]
     pub(in crate::audit) fn beyond(&self, forest: &Forest, next: u32, terminated: bool) -> f64 {
