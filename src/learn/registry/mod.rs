@@ -1,9 +1,15 @@
 //! The one place where an agent is registered: its name, its parameters with their defaults and
 //! ranges, and how it is built. The script host, `list agents`, suggestions and the docs read it.
+//!
+//! A family of agents has a file of its own with a constant per agent, which [`AGENTS`] lists.
 
-use super::params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
-use super::planning::{Planner, ValueIteration};
-use super::{Learn, QLearning, QTable, RandomAgent, Sarsa, Schedule};
+mod control;
+mod planners;
+mod shared;
+
+use super::params::{AgentConfig, ParamSpec};
+use super::planning::Planner;
+use super::{Learn, QLearning, QTable, Sarsa};
 use crate::mdp::streams::Stream;
 use crate::shaping::Shielded;
 
@@ -107,105 +113,9 @@ impl AnyAgent {
     }
 }
 
-const UNIT: ParamKind = ParamKind::Float { min: 0.0, max: 1.0, open: false };
-const ANY: ParamKind = ParamKind::Float { min: f64::NEG_INFINITY, max: f64::INFINITY, open: false };
-
-const ALPHA: ParamSpec = ParamSpec {
-    name: "alpha",
-    kind: ParamKind::Rate { open: true },
-    function: None,
-    default: ParamValue::Schedule(Schedule::Constant { value: 0.1 }),
-    doc: "step size: a number or a schedule",
-};
-const GAMMA: ParamSpec = ParamSpec {
-    name: "gamma",
-    kind: UNIT,
-    function: None,
-    default: ParamValue::Float(0.99),
-    doc: "discount factor, of the learner and of potential-based shaping",
-};
-const EPSILON: ParamSpec = ParamSpec {
-    name: "epsilon",
-    kind: ParamKind::Rate { open: false },
-    function: None,
-    default: ParamValue::Schedule(Schedule::Constant { value: 0.1 }),
-    doc: "exploration rate: a number or a schedule",
-};
-const INITIAL_Q: ParamSpec = ParamSpec {
-    name: "initial_q",
-    kind: ANY,
-    function: Some(Signature { text: "(s) -> number or (s, a) -> number", arities: &[1, 2] }),
-    default: ParamValue::Float(0.0),
-    doc: "initial action value: a number (optimistic if above what can be reached) or a function",
-};
-
 /// Every agent, in the order in which they are listed.
-pub static AGENTS: &[AgentSpec] = &[
-    AgentSpec {
-        name: "q_learning",
-        doc: "Q-learning, ε-greedy (Watkins 1989; Sutton & Barto 6.5)",
-        params: &[ALPHA, GAMMA, EPSILON, INITIAL_Q],
-        build: Build::Learner(|c, mut setup| {
-            AnyAgent::QLearning(QLearning::new(
-                setup.table(c),
-                c.float("gamma"),
-                c.schedule("alpha"),
-                c.schedule("epsilon"),
-                setup.stream,
-            ))
-        }),
-    },
-    AgentSpec {
-        name: "sarsa",
-        doc: "SARSA, ε-greedy (Rummery & Niranjan 1994; Sutton & Barto 6.4)",
-        params: &[ALPHA, GAMMA, EPSILON, INITIAL_Q],
-        build: Build::Learner(|c, mut setup| {
-            AnyAgent::Sarsa(Sarsa::new(
-                setup.table(c),
-                c.float("gamma"),
-                c.schedule("alpha"),
-                c.schedule("epsilon"),
-                setup.stream,
-            ))
-        }),
-    },
-    AgentSpec {
-        name: "value_iteration",
-        doc: "value iteration on the environment's model, then greedy play (Sutton & Barto 4.4)",
-        params: &[
-            GAMMA,
-            ParamSpec {
-                name: "theta",
-                kind: ParamKind::Float { min: 0.0, max: f64::INFINITY, open: true },
-                function: None,
-                default: ParamValue::Float(1e-12),
-                doc: "stop when no value changes by more than this in a sweep",
-            },
-            ParamSpec {
-                name: "max_sweeps",
-                kind: ParamKind::Int { min: 1 },
-                function: None,
-                default: ParamValue::Int(100_000),
-                doc: "stop after this many sweeps in any case",
-            },
-        ],
-        build: Build::Planner(|c| {
-            Box::new(ValueIteration {
-                gamma: c.float("gamma"),
-                theta: c.float("theta"),
-                max_sweeps: c.int("max_sweeps") as usize,
-            })
-        }),
-    },
-    AgentSpec {
-        name: "random_agent",
-        doc: "every action with the same probability; learns nothing",
-        params: &[GAMMA],
-        build: Build::Learner(|c, setup| {
-            AnyAgent::tabular(RandomAgent::new(setup.n_actions, c.float("gamma"), setup.stream))
-        }),
-    },
-];
+pub static AGENTS: &[AgentSpec] =
+    &[control::Q_LEARNING, control::SARSA, planners::VALUE_ITERATION, planners::RANDOM_AGENT];
 
 /// The agent called `name`.
 pub fn find(name: &str) -> Option<&'static AgentSpec> {
@@ -215,6 +125,7 @@ pub fn find(name: &str) -> Option<&'static AgentSpec> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learn::{ParamKind, ParamValue, Schedule};
 
     #[test]
     fn every_default_is_what_its_parameter_admits() {
