@@ -7,12 +7,16 @@
 //! - [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what they are made of
 //!
 //! Agents never log, never see a clock, and know nothing of shaping: they learn from the reward
-//! they are handed.
+//! they are handed. The exceptions are shapings that need what only an agent knows: [`Advised`],
+//! [`LookBack`], [`Bootstrapped`].
 //!
 //! [`FiniteMdp`]: crate::mdp::FiniteMdp
 
+mod advised;
 mod agent;
+mod bootstrapped;
 mod greedy;
+mod look_back;
 mod params;
 pub mod planning;
 mod q_learning;
@@ -23,10 +27,13 @@ mod sarsa;
 mod schedule;
 mod tabular;
 
+pub use advised::{Advised, Backup};
 pub use agent::{Agent, Last, Learn, Seen};
+pub use bootstrapped::{Bootstrapped, stability_bound};
 pub use greedy::{
     Behaviour, argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed,
 };
+pub use look_back::LookBack;
 pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
 pub use q_learning::QLearning;
 pub use q_table::QTable;

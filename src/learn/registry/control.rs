@@ -2,34 +2,40 @@
 
 use super::shared::{ALPHA, EPSILON, GAMMA, INITIAL_Q};
 use super::{AgentSpec, AnyAgent, Build};
-use crate::learn::{QLearning, Sarsa};
+use crate::learn::{Backup, QLearning, Sarsa};
 
 pub(super) const Q_LEARNING: AgentSpec = AgentSpec {
     name: "q_learning",
     doc: "Q-learning, ε-greedy (Watkins 1989; Sutton & Barto 6.5)",
     params: &[ALPHA, GAMMA, EPSILON, INITIAL_Q],
-    build: Build::Learner(|c, mut setup| {
-        AnyAgent::QLearning(QLearning::new(
-            setup.table(c),
-            c.float("gamma"),
-            c.schedule("alpha"),
-            c.schedule("epsilon"),
-            setup.stream,
-        ))
-    }),
+    build: Build::OneStep {
+        backup: Backup::Best,
+        build: |c, mut setup| {
+            AnyAgent::QLearning(QLearning::new(
+                setup.table(c),
+                c.float("gamma"),
+                c.schedule("alpha"),
+                c.schedule("epsilon"),
+                setup.stream,
+            ))
+        },
+    },
 };
 
 pub(super) const SARSA: AgentSpec = AgentSpec {
     name: "sarsa",
     doc: "SARSA, ε-greedy (Rummery & Niranjan 1994; Sutton & Barto 6.4)",
     params: &[ALPHA, GAMMA, EPSILON, INITIAL_Q],
-    build: Build::Learner(|c, mut setup| {
-        AnyAgent::Sarsa(Sarsa::new(
-            setup.table(c),
-            c.float("gamma"),
-            c.schedule("alpha"),
-            c.schedule("epsilon"),
-            setup.stream,
-        ))
-    }),
+    build: Build::OneStep {
+        backup: Backup::Played,
+        build: |c, mut setup| {
+            AnyAgent::Sarsa(Sarsa::new(
+                setup.table(c),
+                c.float("gamma"),
+                c.schedule("alpha"),
+                c.schedule("epsilon"),
+                setup.stream,
+            ))
+        },
+    },
 };

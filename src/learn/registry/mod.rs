@@ -9,7 +9,7 @@ mod shared;
 
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
-use super::{Learn, QLearning, QTable, Sarsa};
+use super::{Advised, Backup, Learn, QLearning, QTable, Sarsa};
 use crate::mdp::streams::Stream;
 use crate::shaping::Shielded;
 
@@ -36,11 +36,21 @@ impl Setup {
     }
 }
 
+/// Makes a learner.
+pub type BuildFn = fn(&AgentConfig, Setup) -> AnyAgent;
+
 /// How an agent comes to be.
 #[derive(Debug, Clone, Copy)]
 pub enum Build {
     /// A learner.
-    Learner(fn(&AgentConfig, Setup) -> AnyAgent),
+    Learner(BuildFn),
+    /// A learner of action values with one-step targets.
+    OneStep {
+        /// How it is built.
+        build: BuildFn,
+        /// Which action its target bootstraps from.
+        backup: Backup,
+    },
     /// A planner, which needs the environment's finite model.
     Planner(fn(&AgentConfig) -> Box<dyn Planner>),
 }
@@ -56,6 +66,29 @@ pub struct AgentSpec {
     pub params: &'static [ParamSpec],
     /// How it is built.
     pub build: Build,
+}
+
+impl AgentSpec {
+    /// Whether it takes look-ahead advice, and can be shaped by its own values.
+    pub fn is_one_step(&self) -> bool {
+        matches!(self.build, Build::OneStep { .. })
+    }
+
+    /// Whether it takes look-back advice: it learns the values of the policy it plays.
+    pub fn is_on_policy(&self) -> bool {
+        matches!(self.build, Build::OneStep { backup: Backup::Played, .. })
+    }
+
+    /// The agent as it is with look-ahead advice `phi`, shape `[n_states, n_actions]`; `None` if it
+    /// takes none.
+    pub fn advised(&self, config: &AgentConfig, mut setup: Setup, phi: QTable) -> Option<AnyAgent> {
+        let Build::OneStep { backup, .. } = self.build else { return None };
+        let learned = setup.table(config);
+        let [alpha, epsilon] = ["alpha", "epsilon"].map(|rate| config.schedule(rate));
+        let gamma = config.float("gamma");
+        let agent = Advised::new(backup, learned, phi, gamma, alpha, epsilon, setup.stream);
+        Some(AnyAgent::tabular(agent))
+    }
 }
 
 /// Any agent whose states are the rows of a table, with a shield or without.
