@@ -1,8 +1,27 @@
-//! Exact statements about shaping, on finite models.
+//! What can be said about a shaping: exactly on finite models, and from samples elsewhere.
 //!
 //! - [`preservation`]: does the shaped model have the same optimal policies as the plain one, and
 //!   is it shaped by a potential alone?
+//! - [`strict`]: is it shaped by a potential, transition by transition? By which, or which two
+//!   episodes prove that there is none ([`Certificate`])?
+//! - [`pattern`]: what kind of term is it, if it is no potential's?
+//! - [`pathwise()`]: without a model, is every way from a state paid the same?
+//! - [`query()`]: and is what is paid a difference of potentials for any two states?
 
+mod certificate;
+mod pathwise;
+mod pattern;
 mod preservation;
+mod query;
+#[cfg(test)]
+mod specimens;
+mod strict;
 
+pub use certificate::{Certificate, Walk, WalkStep};
+pub use pathwise::{
+    Divergence, Path, Pathwise, PathwiseSettings, StepDependence, pathwise, rule_of_three,
+};
+pub use pattern::{Pattern, pattern};
 pub use preservation::{Preservation, Verdict, preservation};
+pub use query::{Leg, Query, QuerySettings, Witness, query};
+pub use strict::{Diagnosis, Difference, Finding, Strict, TerminalPotential, strict};

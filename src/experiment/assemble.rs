@@ -305,7 +305,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let planner = build(&variant.agent);
             let model = learned_model(host, variant, env)?;
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
-            let solution = planner.solve(&model.shaped, &v0);
+            let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
             let sweeps = solution.changes.clone();
             Ok((AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma())), sweeps))
         }

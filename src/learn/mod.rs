@@ -2,7 +2,7 @@
 //!
 //! - [`Agent`], [`Learn`]: chooses actions and learns from rewards; [`QLearning`], [`Sarsa`],
 //!   [`RandomAgent`]
-//! - [`planning`]: value iteration, exact policy evaluation, Q from V on a [`FiniteMdp`]
+//! - [`planning`]: value iteration, policy iteration, exact policy evaluation on a [`FiniteMdp`]
 //! - [`registry`]: the one place where an agent is registered; [`AgentConfig`] is its configuration
 //! - [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what they are made of
 //!

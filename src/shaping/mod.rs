@@ -2,6 +2,7 @@
 //!
 //! - [`Discretiser`]: observation → what the agent sees. [`StateIndex`], [`Bins`],
 //!   [`ScriptedCells`], [`RawFields`]; [`Shield`]: the actions allowed there
+//! - [`Features`]: the state's numbers → features, for linear values; [`Tiles`], [`Fourier`]
 //! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`EpisodePotential`], [`RawPotential`]
 //! - [`Scale`]: observation normalisation
 //! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
@@ -14,6 +15,7 @@
 
 mod bins;
 mod discretiser;
+mod features;
 mod potential;
 mod reward;
 mod scale;
@@ -24,6 +26,7 @@ pub use discretiser::{
     ActionSet, AnyCells, CellFn, Discretiser, Fields, RawFields, ScriptedCells, Seen, Shield,
     ShieldFn, Shielded, ShieldedCells, StateIndex,
 };
+pub use features::{Active, FeatureKind, FeatureSpec, Features, Fourier, MAX_WEIGHTS, Tiles};
 pub use potential::{
     ActionFn, AnyPotential, CellEpisodeFn, CellPhiFn, CellPotential, EpisodePotential, NoPotential,
     PhiFn, Potential, RawPotential, potential_term, shaped_model,

@@ -10,6 +10,7 @@ mod golden;
 mod language;
 mod numbers;
 mod parity;
+mod placing;
 mod play;
 mod readme;
 mod refusals;
