@@ -136,7 +136,8 @@ mod tests {
 
     #[test]
     fn a_bonus_for_an_action_is_seen_where_two_lead_the_same_way() {
-        let stay = |reward| vec![Outcome { probability: 1.0, next_state: 0, reward, terminated: false }];
+        let stay =
+            |reward| vec![Outcome { probability: 1.0, next_state: 0, reward, terminated: false }];
         let mdp = FiniteMdp::new(&[vec![stay(0.0), stay(0.0)]], vec![1.0]).unwrap();
         assert_eq!(pattern(&mdp, &[0.0, 1.0], &[true]), Pattern::OfAction);
     }

@@ -1,15 +1,15 @@
-//! Puts together what a variant describes: discretiser, potential, reward, agent.
+//! Puts together what a variant describes: discretiser, reward, agent.
 
+use super::shaped::{learner, potential};
 use crate::learn::AnyAgent;
 use crate::learn::planning::PlannedAgent;
 use crate::learn::registry::{Build, Setup};
 use crate::mdp::streams::Stream;
 use crate::mdp::{Env, FiniteMdp, Schema};
-use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, Variant};
 use crate::shaping::{
-    AnyPotential, AnyReward, Bins, CellPotential, Fault, MAX_FIELDS, NativeReward, NoPotential,
-    Potential, RawPotential, RewardModel, ScriptedReward, Shield, TabulatedReward, Transition,
-    shaped_model,
+    AnyReward, Bins, Fault, MAX_FIELDS, NativeReward, Potential, RewardModel, ScriptedReward,
+    Shield, TabulatedReward, Transition, shaped_model,
 };
 
 /// A state with every field in the middle of its range (0 where that is unbounded): the values of
@@ -97,40 +97,6 @@ pub(super) fn of_action<E: Env + Clone + 'static>(
         }
     }
     Ok(values)
-}
-
-/// How a variant's potential is evaluated: on the states themselves, on bin centres, or raw.
-pub(super) fn potential<E: Env + Clone + 'static>(
-    host: &Host,
-    variant: &Variant,
-    env: &E,
-    n_cells: usize,
-) -> Result<AnyPotential, Fault> {
-    let Some(callback) = &variant.potential else { return Ok(AnyPotential::No(NoPotential)) };
-    let schema = env.schema();
-    let n_fields = schema.fields.len();
-    let mut phi = host.callbacks().potential(callback, &schema);
-    let fields_of = match variant.potential_on {
-        PhiOn::Raw if !matches!(variant.discretiser, DiscretiserSpec::StateIndex) => None,
-        _ => representative(variant, env),
-    };
-    let Some(fields_of) = fields_of else {
-        return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi)));
-    };
-    let mut at = move |cell: usize| phi(&fields_of(cell)[..n_fields]);
-    let potential = if let DiscretiserSpec::StateIndex = variant.discretiser {
-        // Reachable states at once, so that a mistake shows before training; the others, which may
-        // be junk, never. Without a model nobody knows which those are.
-        let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
-        let mut table = vec![f64::NAN; n_cells];
-        for (index, _) in reachable.iter().enumerate().filter(|(_, r)| **r) {
-            table[index] = at(index)?;
-        }
-        CellPotential::partial(table, Box::new(at))
-    } else {
-        CellPotential::new(n_cells, Box::new(at))
-    };
-    Ok(AnyPotential::Cell(potential))
 }
 
 /// A variant's reward model. On finite environments it is tabulated, unless it reads `t.step`.
@@ -269,6 +235,8 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
     };
     let mut phi = vec![0.0; mdp.n_states()];
     let mut potential = potential(host, variant, env, mdp.n_states())?;
+    // A potential that changes is what it is at the end.
+    Potential::<E>::begin_episode(&mut potential, variant.episodes);
     for s in (0..mdp.n_states()).filter(|&s| reachable[s]) {
         let obs = env.state(s).expect("a finite environment");
         phi[s] = potential.phi(env, s, &obs)?;
@@ -286,7 +254,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
     seed: u64,
 ) -> Result<(AnyAgent, Vec<f64>), Fault> {
     match variant.agent.spec.build {
-        Build::Learner(build) => {
+        Build::Learner(build) | Build::OneStep { build, .. } => {
             let initial_q = match variant.agent_functions.get("initial_q") {
                 Some(f) => {
                     Some(of_action(host, variant, env, n_cells, f, "the initial action value")?)
@@ -299,7 +267,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
                 stream: Stream::new(seed, "agent"),
                 initial_q,
             };
-            Ok((build(&variant.agent, setup), Vec::new()))
+            Ok((learner(host, variant, env, build, setup)?, Vec::new()))
         }
         Build::Planner(build) => {
             let planner = build(&variant.agent);

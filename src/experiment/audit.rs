@@ -6,7 +6,7 @@ use super::assemble::{NotAModelError, diagnostic_of, learned_model};
 use crate::audit::{Preservation, Verdict, preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
-use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+use crate::script::{AdviceOn, Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
 use crate::shaping::Fault;
 
 /// The verdict on a variant's shaping.
@@ -66,11 +66,32 @@ impl Audit {
 /// # Errors
 /// If a callback fails.
 pub fn audit_variant(host: &Host, variant: &Variant) -> Result<Audit, Diagnostic> {
-    if variant.potential.is_none() && !variant.changes_reward() {
+    if !variant.is_shaped() && !variant.changes_reward() {
         return Ok(Audit::new("unshaped", Some(true), "the agent learns from the native reward"));
+    }
+    if variant.shaping.advice.is_some() && variant.shaping.advice_on == AdviceOn::LookBack {
+        let basis = if variant.agent.spec.is_one_step() {
+            "look-back advice is not undone where a learner bootstraps"
+        } else {
+            "look-back advice is undone over whole returns only"
+        };
+        return Ok(Audit::new("not checked", None, basis));
     }
     let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     env.visit(Judge { host, variant })
+}
+
+/// On what a potential-based verdict rests, where the model can be solved.
+fn basis(variant: &Variant) -> &'static str {
+    if variant.shaping.advice.is_some() {
+        "by construction: choices are made by Q_F + Φ(s, a)"
+    } else if variant.shaping.learned.is_some() {
+        "by construction: Q_F = Q − η / (1 + η) V, where it settles"
+    } else if variant.is_dynamic() {
+        "by construction, exact for Φ of the last episode: Q_F + Φ = Q"
+    } else {
+        "exact: Q_F + Φ = Q and the greedy sets are equal"
+    }
 }
 
 struct Judge<'a> {
@@ -85,13 +106,14 @@ impl EnvVisitor for Judge<'_> {
         let (host, variant) = (self.host, self.variant);
         let potential_only = !variant.changes_reward();
         let DiscretiserSpec::StateIndex = variant.discretiser else {
-            return Ok(match (potential_only, variant.potential_on) {
-                (true, PhiOn::Cell) => Audit::new(
+            let raw = variant.potential.is_some() && variant.potential_on == PhiOn::Raw;
+            return Ok(match (potential_only, raw) {
+                (true, false) => Audit::new(
                     "potential-based",
                     Some(true),
                     "by construction, for the discretised problem: Φ is constant on each cell",
                 ),
-                (true, PhiOn::Raw) => {
+                (true, true) => {
                     Audit::new("not checked", None, "Φ of the raw state is not constant on cells")
                 }
                 (false, _) => {
@@ -142,7 +164,7 @@ impl EnvVisitor for Judge<'_> {
                 ("inconclusive", None, "two actions are too close for the numbers to decide")
             }
             Verdict::Preserved if potential_only && result.identity_holds() => {
-                ("potential-based", Some(true), "exact: Q_F + Φ = Q and the greedy sets are equal")
+                ("potential-based", Some(true), basis(variant))
             }
             Verdict::Preserved => {
                 ("policy preserved", Some(true), "exact: the greedy sets are equal")

@@ -153,3 +153,58 @@ impl<S: Seen> Learn<S> for Advised {
         self.behaviour.end_episode();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// State 0: action 0 is worth 1 and ends; state 1 is worth 4 or 2.
+    fn learner(backup: Backup, phi: Vec<f64>) -> Advised {
+        let q = QTable::from_values(2, vec![0.0, 1.0, 4.0, 2.0]);
+        let (alpha, epsilon) = (Schedule::constant(0.5), Schedule::constant(0.0));
+        let phi = QTable::from_values(2, phi);
+        Advised::new(backup, q, phi, 0.9, alpha, epsilon, Stream::new(0, "test"))
+    }
+
+    #[test]
+    fn a_step_by_hand() {
+        for backup in [Backup::Best, Backup::Played] {
+            // Corrected: (3, 1) and (4, 7).
+            let mut agent = learner(backup, vec![3.0, 0.0, 0.0, 5.0]);
+            assert_eq!(agent.begin(0), 0, "by the corrected values");
+            assert_eq!(agent.step(10.0, 1), 1);
+            // F = 0.9 * 5 - 3 = 1.5; bootstrapped from Q_F(1, 1) = 2, not from the 4 beside it.
+            assert_eq!(agent.learned().get(0, 0), 0.5 * (10.0 + 1.5 + 0.9 * 2.0));
+            assert_eq!(agent.q().unwrap().get(0, 0), agent.learned().get(0, 0) + 3.0);
+            agent.end(1.0, Last::<usize>::Terminated);
+            // F = -5.
+            assert_eq!(agent.learned().get(1, 1), 2.0 + 0.5 * (1.0 - 5.0 - 2.0));
+            assert_eq!(agent.shaping(), 1.5 - 5.0);
+            agent.begin(0);
+            assert_eq!(agent.shaping(), 0.0, "an episode's own");
+        }
+    }
+
+    #[test]
+    fn the_target_of_a_truncated_state_keeps_its_advice() {
+        let mut agent = learner(Backup::Best, vec![3.0, 0.0, 0.0, 5.0]);
+        agent.begin(0);
+        agent.end(10.0, Last::Truncated(1));
+        assert_eq!(agent.learned().get(0, 0), 0.5 * (10.0 + 1.5 + 0.9 * 2.0));
+    }
+
+    /// Two arms paying 1 and 0, advice 2 for the first: Q_F = (-1, 0), whose greedy arm is wrong.
+    #[test]
+    fn a_bandit_by_hand() {
+        let (alpha, epsilon) = (Schedule::constant(1.0), Schedule::constant(1.0));
+        let (zero, phi) = (QTable::new(1, 2, 0.0), QTable::from_values(2, vec![2.0, 0.0]));
+        let stream = Stream::new(0, "test");
+        let mut agent = Advised::new(Backup::Best, zero, phi, 0.9, alpha, epsilon, stream);
+        for _ in 0..20 {
+            let arm = agent.begin(0);
+            agent.end([1.0, 0.0][arm], Last::<usize>::Terminated);
+        }
+        assert_eq!(agent.learned().values(), [-1.0, 0.0]);
+        assert_eq!(agent.q().unwrap().values(), [1.0, 0.0]);
+    }
+}

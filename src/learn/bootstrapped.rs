@@ -96,3 +96,41 @@ where
         self.agent.end(reward + f, last);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::{QLearning, Schedule};
+    use crate::mdp::streams::Stream;
+
+    #[test]
+    fn a_step_by_hand() {
+        let q = QTable::from_values(2, vec![0.0, 1.0, 4.0, 2.0]);
+        let (alpha, epsilon) = (Schedule::constant(0.5), Schedule::constant(0.0));
+        let learner = QLearning::new(q, 0.9, alpha, epsilon, Stream::new(0, "test"));
+        let mut agent = Bootstrapped::new(Box::new(learner), 2.0);
+        assert_eq!(agent.begin(0usize), 1);
+        // V = 1 and 4: 2 (0.9 * 4 - 1) = 5.2; Q = 1 + 0.5 (10 + 5.2 + 0.9 * 4 - 1).
+        assert_eq!(agent.step(10.0, 1usize), 0);
+        let f = 2.0 * (0.9 * 4.0 - 1.0);
+        assert_eq!(agent.shaping(), f);
+        assert_eq!(agent.q().unwrap().get(0, 1), 1.0 + 0.5 * (10.0 + f + 0.9 * 4.0 - 1.0));
+        // V(1) = 4 still; nothing beyond the end: -8.
+        agent.end(0.0, Last::<usize>::Terminated);
+        assert_eq!(agent.q().unwrap().get(1, 0), 4.0 + 0.5 * (-8.0 - 4.0));
+    }
+
+    #[test]
+    fn both_terms_speak_of_the_values_before_the_update() {
+        let q = QTable::from_values(1, vec![2.0]);
+        let (alpha, epsilon) = (Schedule::constant(0.5), Schedule::constant(0.0));
+        let learner = QLearning::new(q, 0.5, alpha, epsilon, Stream::new(0, "test"));
+        let mut agent = Bootstrapped::new(Box::new(learner), 1.0);
+        agent.begin(0usize);
+        // Q: 2 + 0.5 (0.5 * 2 - 2 + 0.5 * 2 - 2) = 1, then 1 + 0.5 (0.5 - 1 + 0.5 - 1) = 0.5.
+        agent.step(0.0, 0usize);
+        assert_eq!(agent.q().unwrap().get(0, 0), 1.0);
+        agent.step(0.0, 0usize);
+        assert_eq!(agent.q().unwrap().get(0, 0), 0.5);
+    }
+}

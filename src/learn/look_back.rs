@@ -94,3 +94,51 @@ where
         self.agent.end(reward + f, last);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::{Sarsa, Schedule};
+    use crate::mdp::streams::Stream;
+
+    const PHI: [f64; 4] = [3.0, 1.0, 2.0, 5.0];
+
+    /// Greedy, and learning nothing to speak of: action 1 in state 0, action 0 in state 1.
+    fn agent() -> LookBack {
+        let q = QTable::from_values(2, vec![0.0, 1.0, 4.0, 2.0]);
+        let (alpha, epsilon) = (Schedule::constant(1e-300), Schedule::constant(0.0));
+        let sarsa = Sarsa::new(q, 0.5, alpha, epsilon, Stream::new(0, "test"));
+        LookBack::new(Box::new(sarsa), QTable::from_values(2, PHI.to_vec()))
+    }
+
+    #[test]
+    fn the_discounted_terms_of_an_episode_cancel() {
+        let mut agent = agent();
+        let mut terms = Vec::new();
+        let mut before = 0.0;
+        let mut heard = |agent: &LookBack| {
+            terms.push(agent.shaping() - before);
+            before = agent.shaping();
+        };
+        assert_eq!(agent.begin(0usize), 1);
+        assert_eq!(agent.step(0.0, 1usize), 0);
+        heard(&agent);
+        assert_eq!(agent.step(0.0, 0usize), 1);
+        heard(&agent);
+        agent.end(0.0, Last::<usize>::Terminated);
+        heard(&agent);
+        // 1, then 2 - 1 / 0.5, then 0 - 2 / 0.5.
+        assert_eq!(terms, [1.0, 0.0, -4.0]);
+        assert_eq!(1.0 + 0.5 * 0.0 + 0.25 * -4.0, 0.0);
+    }
+
+    #[test]
+    fn an_episode_that_is_cut_off_keeps_its_last_advice() {
+        let mut agent = agent();
+        agent.begin(0usize);
+        agent.step(0.0, 1usize);
+        // Not the last step for SARSA, which bootstraps: 1 + 2 - 1 / 0.5.
+        agent.end(0.0, Last::Truncated(0usize));
+        assert_eq!(agent.shaping(), 1.0);
+    }
+}

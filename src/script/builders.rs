@@ -14,6 +14,7 @@ use super::engine::Context;
 use super::params::{merge_agent, number, per_step, show, whole};
 use super::plan::GoldenBudget;
 use super::setting::Entries;
+use super::shaping::LearnedPotential;
 use crate::env::frozen_lake::{MAX_TILES, random_map_within};
 use crate::learn::registry::{AGENTS, AgentSpec};
 use crate::learn::{AgentConfig, Schedule, Unit};
@@ -90,6 +91,7 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     engine.register_type_with_name::<EnvDraft>("environment");
     engine.register_type_with_name::<DiscretiserDraft>("discretiser");
     engine.register_type_with_name::<Schedule>("schedule");
+    engine.register_type_with_name::<LearnedPotential>("learned potential");
     experiments(engine, context);
     studies(engine, context);
     environments(engine, context);
@@ -98,6 +100,7 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     }
     schedules(engine, context);
     discretisers(engine, context);
+    potentials(engine, context);
 }
 
 fn experiments(engine: &mut Engine, context: &Rc<Context>) {
@@ -352,6 +355,17 @@ fn discretisers(engine: &mut Engine, context: &Rc<Context>) {
                 .map_err(|d| d.at(call.arg(0).place()))
                 .map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
         )
+    });
+}
+
+fn potentials(engine: &mut Engine, context: &Rc<Context>) {
+    let c = context.clone();
+    engine.register_fn("learned", move |native: NativeCallContext, eta: Dynamic| {
+        let call = Call::new(&c, &native);
+        let finite = number(&eta).filter(|eta| eta.is_finite()).map(LearnedPotential);
+        call.finish(finite.ok_or_else(|| {
+            Diagnostic::error(format!("`learned` takes a finite number, got {}", show(&eta)))
+        }))
     });
 }
 
