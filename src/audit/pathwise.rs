@@ -19,7 +19,8 @@ mod tests;
 
 use serde::{Serialize, Serializer};
 
-use crate::mdp::{Action, Ending, Env, math};
+use crate::mdp::numpy::NumpyRng;
+use crate::mdp::{Action, Ending, Env, Step, math};
 use crate::shaping::{Fault, Transition};
 use play::{Player, Trajectory};
 
@@ -99,6 +100,24 @@ impl Pathwise {
 /// `3 / n` (Hanley & Lippman-Hand 1983); 1 if there were none to speak of.
 pub fn rule_of_three(n: usize) -> f64 {
     if n == 0 { 1.0 } else { (3.0 / n as f64).min(1.0) }
+}
+
+/// One step of the agent: `action`, repeated over the skipped frames.
+pub(super) fn advance<E: Env>(
+    env: &mut E,
+    action: Action,
+    frame_skip: u32,
+    rng: &mut NumpyRng,
+) -> Step<E::Obs> {
+    let mut step = env.step(action, rng);
+    for _ in 1..frame_skip {
+        if step.terminated {
+            break;
+        }
+        let more = env.step(action, rng);
+        step = Step { reward: step.reward + more.reward, ..more };
+    }
+    step
 }
 
 /// `f`, unless nothing can be said about it.

@@ -64,6 +64,14 @@ pub struct Difference {
     pub state: usize,
 }
 
+impl Difference {
+    /// Of differences by state, in the order of the states. `None` if there are none.
+    pub(super) fn largest(differences: impl Iterator<Item = (usize, f64)>) -> Option<Self> {
+        let each = differences.map(|(state, d)| Self { largest: d.abs(), state });
+        each.reduce(|a, b| if b.largest > a.largest { b } else { a })
+    }
+}
+
 /// Whether F is a potential's, transition by transition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Strict {
@@ -120,19 +128,15 @@ pub fn strict(
         violations: check.violations,
         largest_error: check.largest,
         scale: check.scale,
-        declared: declared.and_then(|phi| difference(&forest, &recovered.phi, phi)),
+        declared: declared.and_then(|phi| {
+            let reached = (0..phi.len()).filter(|&s| forest.anchor[s] != forest::NONE);
+            Difference::largest(reached.map(|s| (s, recovered.phi[s] - phi[s])))
+        }),
         potential: recovered.phi,
         free_constants: recovered.free,
         diagnosis,
         certificate,
     }
-}
-
-fn difference(forest: &Forest, recovered: &[f64], declared: &[f64]) -> Option<Difference> {
-    let apart = |&s: &u32| (recovered[s as usize] - declared[s as usize]).abs();
-    let largest = forest.order.iter().map(apart).reduce(f64::max)?;
-    let state = forest.order.iter().filter(|s| apart(s) == largest).min()?;
-    Some(Difference { largest, state: *state as usize })
 }
 
 /// How well a potential agrees with the rewards.

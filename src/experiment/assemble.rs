@@ -99,24 +99,30 @@ pub(super) fn of_action<E: Env + Clone + 'static>(
     Ok(values)
 }
 
+/// A variant's reward model, asked step by step.
+pub(super) fn scripted_reward<E: Env>(host: &Host, variant: &Variant, env: &E) -> AnyReward<E> {
+    if variant.reward.is_none() && variant.terms.is_empty() {
+        return AnyReward::Native(NativeReward);
+    }
+    let terms: Vec<Callback> = variant.terms.values().cloned().collect();
+    let reward = host.callbacks().reward(variant.reward.as_ref(), &terms, &env.schema());
+    AnyReward::Scripted(ScriptedReward::<E>(reward))
+}
+
 /// A variant's reward model. On finite environments it is tabulated, unless it reads `t.step`.
 pub(super) fn reward<E: Env + Clone + 'static>(
     host: &Host,
     variant: &Variant,
     env: &E,
 ) -> Result<AnyReward<E>, Fault> {
-    if variant.reward.is_none() && variant.terms.is_empty() {
+    let AnyReward::Scripted(mut scripted) = scripted_reward(host, variant, env) else {
         return Ok(AnyReward::Native(NativeReward));
-    }
-    let schema = env.schema();
-    let terms: Vec<Callback> = variant.terms.values().cloned().collect();
+    };
     let callbacks = host.callbacks();
-    let mut scripted =
-        ScriptedReward::<E>(callbacks.reward(variant.reward.as_ref(), &terms, &schema));
     // Over several frames the last outcome alone does not determine the reward.
     if let (Some(mdp), 1) = (env.finite(), variant.frame_skip) {
         callbacks.clear_step_read();
-        let table = tabulate(env, mdp, terms.len(), &mut scripted)?;
+        let table = tabulate(env, mdp, variant.terms.len(), &mut scripted)?;
         if !callbacks.step_read() {
             return Ok(AnyReward::Tabulated(table));
         }

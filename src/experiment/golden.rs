@@ -79,7 +79,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
 
 fn exact(audit: &Audit, out: &mut String) {
     writeln!(out, "  shaping {}: {}", audit.label(), audit.basis).expect(MEMORY);
-    if let Some(exact) = &audit.exact {
+    if let Some(exact) = audit.preservation() {
         let holds = if exact.identity_holds() { "holds" } else { "does not hold" };
         writeln!(
             out,

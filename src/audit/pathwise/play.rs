@@ -1,10 +1,10 @@
 //! The trajectories of [`pathwise`](super::pathwise): where they start, what is played, what is
 //! paid.
 
-use super::{Path, PathwiseSettings, StepDependence, finite};
+use super::{Path, PathwiseSettings, StepDependence, advance, finite};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::streams::Stream;
-use crate::mdp::{Action, Ending, Env, MAX_FIELDS, Step};
+use crate::mdp::{Action, Ending, Env, MAX_FIELDS};
 use crate::shaping::{Fault, Transition};
 
 /// Transitions between two at which `t.step` is varied; terminal ones always are.
@@ -250,22 +250,4 @@ struct Start<E: Env> {
     env: E,
     obs: E::Obs,
     step: u32,
-}
-
-/// One step of the agent: `action`, repeated over the skipped frames.
-fn advance<E: Env>(
-    env: &mut E,
-    action: Action,
-    frame_skip: u32,
-    rng: &mut NumpyRng,
-) -> Step<E::Obs> {
-    let mut step = env.step(action, rng);
-    for _ in 1..frame_skip {
-        if step.terminated {
-            break;
-        }
-        let more = env.step(action, rng);
-        step = Step { reward: step.reward + more.reward, ..more };
-    }
-    step
 }

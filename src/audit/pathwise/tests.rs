@@ -8,6 +8,7 @@ use crate::shaping::potential_term;
 const GAMMA: f64 = 0.99;
 
 type CarStep<'a> = Transition<'a, [f32; 2]>;
+type Term<'a> = &'a dyn Fn(&CarStep<'_>) -> f64;
 
 /// A potential of the car: its speed.
 fn speed([_, velocity]: [f32; 2]) -> f64 {
@@ -121,7 +122,7 @@ fn what_is_no_potential_is_found_and_the_certificate_holds() {
         let at_wall = t.next_state[0] <= -1.2;
         proper(GAMMA, t) + if at_wall { 0.1 } else { 0.0 }
     };
-    let terms: [(&str, &dyn Fn(&CarStep<'_>) -> f64); 6] = [
+    let terms: [(&str, Term<'_>); 6] = [
         ("potential of the terminal state", &kept),
         ("another discount factor", &other_gamma),
         ("fuel", &fuel),
