@@ -1,6 +1,7 @@
 //! Puts together what a variant describes: discretiser, reward, agent.
 
 use super::shaped::{learner, potential};
+use super::shielded::playable;
 use crate::learn::AnyAgent;
 use crate::learn::planning::PlannedAgent;
 use crate::learn::registry::{Build, Setup};
@@ -247,6 +248,7 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
         let obs = env.state(s).expect("a finite environment");
         phi[s] = potential.phi(env, s, &obs)?;
     }
+    let base = playable(host, variant, env, base)?;
     let shaped = shaped_model(&base, variant.agent.float("gamma"), &phi);
     Ok(LearnedModel { shaped, phi })
 }
@@ -260,7 +262,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
     seed: u64,
 ) -> Result<(AnyAgent, Vec<f64>), Fault> {
     match variant.agent.spec.build {
-        Build::Learner(build) | Build::OneStep { build, .. } => {
+        Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. } => {
             let initial_q = match variant.agent_functions.get("initial_q") {
                 Some(f) => {
                     Some(of_action(host, variant, env, n_cells, f, "the initial action value")?)
@@ -270,6 +272,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let setup = Setup {
                 n_states: n_cells,
                 n_actions: env.n_actions(),
+                seed,
                 stream: Stream::new(seed, "agent"),
                 initial_q,
             };

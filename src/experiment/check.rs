@@ -22,6 +22,8 @@ pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
             || !variant.agent_functions.is_empty()
             || variant.reward.is_some()
             || !variant.terms.is_empty()
+            || variant.allowed.is_some()
+            || !variant.agent_functions.is_empty()
             || matches!(variant.discretiser, crate::script::DiscretiserSpec::Cells { .. });
         if !scripted {
             continue;

@@ -18,6 +18,7 @@ mod landscape;
 pub mod play;
 mod record;
 mod shaped;
+mod shielded;
 mod store;
 mod train;
 mod unit;

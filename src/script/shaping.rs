@@ -12,7 +12,7 @@ use super::params::{number, text};
 use super::plan::{Callback, DiscretiserSpec, PhiOn};
 use super::resolve::Resolver;
 use crate::learn::registry::{AGENTS, AgentSpec};
-use crate::learn::{AgentConfig, stability_bound};
+use crate::learn::{AgentConfig, AlphaSource, stability_bound};
 
 /// `potential`, as a script gives it.
 #[derive(Debug, Clone)]
@@ -315,7 +315,11 @@ fn learned(eta: f64, agent: &AgentConfig) -> Result<(), Diagnostic> {
         ))
         .hint(format!("one of: {}", those(AgentSpec::is_one_step))));
     }
-    let (_, alpha) = agent.schedule("alpha").range();
+    let alpha = match agent.alpha() {
+        AlphaSource::Schedule(schedule) => schedule.range().1,
+        // That of the first visit.
+        AlphaSource::VisitCount { .. } => 1.0,
+    };
     let bound = stability_bound(agent.float("gamma"));
     if eta <= -1.0 || alpha * (1.0 + eta) >= bound {
         let largest = bound / alpha - 1.0;

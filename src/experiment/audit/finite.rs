@@ -11,6 +11,7 @@ use crate::audit::{
     preservation, strict,
 };
 use crate::experiment::assemble::{NotAModelError, learned_model};
+use crate::experiment::shielded::playable;
 use crate::mdp::Env;
 use crate::script::{Host, Variant};
 use crate::shaping::Fault;
@@ -56,6 +57,7 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     env: &E,
 ) -> Result<Audit, Fault> {
     let mdp = env.finite().expect("only asked of finite environments");
+    let mdp = &playable(host, variant, env, (**mdp).clone())?;
     let gamma = variant.agent.float("gamma");
     let reachable = mdp.reachable();
     let mut exact = Exact {

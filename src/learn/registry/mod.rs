@@ -7,9 +7,10 @@ mod control;
 mod planners;
 mod shared;
 
+use super::control::{Advised, Backup};
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
-use super::{Advised, Backup, Learn, QLearning, QTable, Sarsa};
+use super::{Learn, QLearning, QTable, Sarsa};
 use crate::mdp::streams::Stream;
 use crate::shaping::Shielded;
 
@@ -20,7 +21,9 @@ pub struct Setup {
     pub n_states: usize,
     /// Number of actions.
     pub n_actions: usize,
-    /// Its randomness.
+    /// The run's seed, for randomness that is not its behaviour's.
+    pub seed: u64,
+    /// The randomness of its behaviour.
     pub stream: Stream,
     /// Initial action values, shape `[n_states, n_actions]`, where a script gives them.
     pub initial_q: Option<Vec<f64>>,
@@ -44,11 +47,13 @@ pub type BuildFn = fn(&AgentConfig, Setup) -> AnyAgent;
 pub enum Build {
     /// A learner.
     Learner(BuildFn),
+    /// A learner of the values of the policy that it plays.
+    OnPolicy(BuildFn),
     /// A learner of action values with one-step targets.
     OneStep {
         /// How it is built.
         build: BuildFn,
-        /// Which action its target bootstraps from.
+        /// What its target bootstraps from.
         backup: Backup,
     },
     /// A planner, which needs the environment's finite model.
@@ -76,18 +81,19 @@ impl AgentSpec {
 
     /// Whether it takes look-back advice: it learns the values of the policy it plays.
     pub fn is_on_policy(&self) -> bool {
-        matches!(self.build, Build::OneStep { backup: Backup::Played, .. })
+        match self.build {
+            Build::OnPolicy(_) => true,
+            Build::OneStep { backup, .. } => backup != Backup::Best,
+            Build::Learner(_) | Build::Planner(_) => false,
+        }
     }
 
     /// The agent as it is with look-ahead advice `phi`, shape `[n_states, n_actions]`; `None` if it
     /// takes none.
-    pub fn advised(&self, config: &AgentConfig, mut setup: Setup, phi: QTable) -> Option<AnyAgent> {
+    pub fn advised(&self, config: &AgentConfig, setup: Setup, phi: QTable) -> Option<AnyAgent> {
         let Build::OneStep { backup, .. } = self.build else { return None };
-        let learned = setup.table(config);
-        let [alpha, epsilon] = ["alpha", "epsilon"].map(|rate| config.schedule(rate));
-        let gamma = config.float("gamma");
-        let agent = Advised::new(backup, learned, phi, gamma, alpha, epsilon, setup.stream);
-        Some(AnyAgent::tabular(agent))
+        let table = control::table(config, setup);
+        Some(AnyAgent::tabular(Advised::new(backup, table, phi)))
     }
 }
 
@@ -147,8 +153,19 @@ impl AnyAgent {
 }
 
 /// Every agent, in the order in which they are listed.
-pub static AGENTS: &[AgentSpec] =
-    &[control::Q_LEARNING, control::SARSA, planners::VALUE_ITERATION, planners::RANDOM_AGENT];
+pub static AGENTS: &[AgentSpec] = &[
+    control::Q_LEARNING,
+    control::SARSA,
+    control::EXPECTED_SARSA,
+    control::DOUBLE_Q_LEARNING,
+    control::N_STEP_SARSA,
+    control::SARSA_LAMBDA,
+    control::Q_LAMBDA,
+    control::DYNA_Q,
+    control::SOFT_Q_LEARNING,
+    planners::VALUE_ITERATION,
+    planners::RANDOM_AGENT,
+];
 
 /// The agent called `name`.
 pub fn find(name: &str) -> Option<&'static AgentSpec> {

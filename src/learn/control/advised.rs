@@ -11,19 +11,22 @@
 //! bootstrapped from included, are therefore chosen by the corrected values `Q_F + Φ`. Those are
 //! what [`Agent::q`] shows.
 
-use super::greedy::argmax_exact;
-use super::{Agent, Behaviour, Last, Learn, QTable, Schedule, ScheduleState, Seen, td_error};
+use super::{Tabular, td_error};
+use crate::learn::greedy::argmax_exact;
+use crate::learn::{Agent, Explore, Last, Learn, QTable, Rate, Seen};
 use crate::mdp::Action;
-use crate::mdp::streams::Stream;
 use crate::shaping::potential_term;
 
-/// Which action a one-step target bootstraps from.
+/// What a one-step target bootstraps from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backup {
-    /// The best one: Q-learning.
+    /// The best action: Q-learning.
     Best,
-    /// The one that is played next: SARSA.
+    /// The action that is played next: SARSA.
     Played,
+    /// All actions, each as likely as it is played: expected SARSA, for which Q_F(S′, A′) and
+    /// Φ(S′, A′) are expectations.
+    Expected,
 }
 
 /// A one-step learner with look-ahead advice.
@@ -33,37 +36,23 @@ pub enum Backup {
 #[derive(Debug, Clone)]
 pub struct Advised {
     backup: Backup,
+    /// Q_F + Φ, kept up to date entry by entry; step size and behaviour.
+    corrected: Tabular,
     /// What is learned: Q_F.
     learned: QTable,
     /// The advice, Φ(s, a).
     phi: QTable,
-    /// Q_F + Φ, kept up to date entry by entry.
-    corrected: QTable,
-    gamma: f64,
-    alpha: ScheduleState,
-    behaviour: Behaviour,
-    s: usize,
-    a: Action,
     /// The sum of F over the episode.
     shaping: f64,
 }
 
 impl Advised {
-    /// A learner that starts with `learned` and is advised by `phi`, a table of the same shape;
-    /// exploration draws from `stream`.
-    pub fn new(
-        backup: Backup,
-        learned: QTable,
-        phi: QTable,
-        gamma: f64,
-        alpha: Schedule,
-        epsilon: Schedule,
-        stream: Stream,
-    ) -> Self {
+    /// The learner that `table` would make, with `phi`, of the same shape, for advice.
+    pub fn new(backup: Backup, table: Tabular, phi: QTable) -> Self {
+        let (learned, mut corrected) = (table.q.clone(), table);
         let sums = learned.values().iter().zip(phi.values()).map(|(q, phi)| q + phi);
-        let corrected = QTable::from_values(learned.n_actions(), sums.collect());
-        let (alpha, behaviour) = (ScheduleState::new(alpha), Behaviour::new(epsilon, stream));
-        Self { backup, learned, phi, corrected, gamma, alpha, behaviour, s: 0, a: 0, shaping: 0.0 }
+        corrected.q = QTable::from_values(learned.n_actions(), sums.collect());
+        Self { backup, corrected, learned, phi, shaping: 0.0 }
     }
 
     /// The values learned from shaped rewards, `Q_F`, without the correction.
@@ -71,42 +60,37 @@ impl Advised {
         &self.learned
     }
 
-    fn choose<S: Seen>(&mut self, s: S) -> Action {
-        self.behaviour.choose(self.corrected.row(s.cell()), s)
-    }
-
-    /// Learns from `reward` and the bootstrap from `next`, `None` where that is terminal.
-    fn update(&mut self, reward: f64, next: Option<(usize, Action)>) {
-        let (q_next, phi_next) = match next {
-            Some((s, a)) => (self.learned.get(s, a), self.phi.get(s, a)),
-            None => (0.0, 0.0),
+    /// What is bootstrapped from in `next`, Q_F and Φ, and the action if it is a single one.
+    fn ahead<S: Seen>(&mut self, next: S) -> (f64, f64, Option<Action>) {
+        let s = next.cell();
+        let a = match self.backup {
+            Backup::Best => argmax_exact(self.corrected.q.row(s), next),
+            Backup::Played => self.corrected.choose(next),
+            Backup::Expected => {
+                let (policy, q) = (&mut self.corrected.behaviour, self.corrected.q.row(s));
+                let learned = policy.mean(q, next, self.learned.row(s));
+                return (learned, policy.mean(q, next, self.phi.row(s)), None);
+            }
         };
-        let phi = self.phi.get(self.s, self.a);
-        let f = potential_term(self.gamma, phi, phi_next);
+        (self.learned.get(s, a), self.phi.get(s, a), Some(a))
+    }
+
+    /// Learns from `reward` and what is bootstrapped from.
+    fn update(&mut self, reward: f64, q_next: f64, phi_next: f64) {
+        let (s, a) = (self.corrected.s, self.corrected.a);
+        let phi = self.phi.get(s, a);
+        let f = potential_term(self.corrected.gamma, phi, phi_next);
         self.shaping += f;
-        let q = self.learned.get_mut(self.s, self.a);
-        *q += self.alpha.value() * td_error(*q, reward + f, self.gamma, q_next);
-        *self.corrected.get_mut(self.s, self.a) = *q + phi;
-        self.alpha.step();
-    }
-
-    fn play<S: Seen>(&mut self, s: S, a: Action) -> Action {
-        (self.s, self.a) = (s.cell(), a);
-        a
-    }
-
-    /// The action bootstrapped from in `next`.
-    fn ahead<S: Seen>(&mut self, next: S) -> Action {
-        match self.backup {
-            Backup::Best => argmax_exact(self.corrected.row(next.cell()), next),
-            Backup::Played => self.choose(next),
-        }
+        let alpha = self.corrected.alpha.visit(self.learned.pair(s, a));
+        let q = self.learned.get_mut(s, a);
+        *q += alpha * td_error(*q, reward + f, self.corrected.gamma, q_next);
+        *self.corrected.q.get_mut(s, a) = *q + phi;
     }
 }
 
 impl Agent for Advised {
     fn gamma(&self) -> f64 {
-        self.gamma
+        self.corrected.gamma
     }
 
     fn bootstraps_when_truncated(&self) -> bool {
@@ -114,11 +98,11 @@ impl Agent for Advised {
     }
 
     fn epsilon(&self) -> f64 {
-        self.behaviour.epsilon()
+        self.corrected.behaviour.epsilon()
     }
 
     fn q(&self) -> Option<&QTable> {
-        Some(&self.corrected)
+        Some(&self.corrected.q)
     }
 
     fn shaping(&self) -> f64 {
@@ -129,46 +113,54 @@ impl Agent for Advised {
 impl<S: Seen> Learn<S> for Advised {
     fn begin(&mut self, s: S) -> Action {
         self.shaping = 0.0;
-        let a = self.choose(s);
-        self.play(s, a)
+        let a = self.corrected.choose(s);
+        self.corrected.play(s, a)
     }
 
     fn step(&mut self, reward: f64, next: S) -> Action {
-        let ahead = self.ahead(next);
-        self.update(reward, Some((next.cell(), ahead)));
-        let a = match self.backup {
-            Backup::Best => self.choose(next),
-            Backup::Played => ahead,
+        let (q_next, phi_next, a) = self.ahead(next);
+        self.update(reward, q_next, phi_next);
+        let a = match (self.backup, a) {
+            (Backup::Played, Some(a)) => a,
+            _ => self.corrected.choose(next),
         };
-        self.play(next, a)
+        self.corrected.play(next, a)
     }
 
     fn end(&mut self, reward: f64, last: Last<S>) {
-        let next = match last {
-            Last::Terminated => None,
-            Last::Truncated(next) => Some((next.cell(), self.ahead(next))),
+        let (q_next, phi_next) = match last {
+            Last::Terminated => (0.0, 0.0),
+            Last::Truncated(next) => {
+                let (q_next, phi_next, _) = self.ahead(next);
+                (q_next, phi_next)
+            }
         };
-        self.update(reward, next);
-        self.alpha.end_episode();
-        self.behaviour.end_episode();
+        self.update(reward, q_next, phi_next);
+        self.corrected.end_episode();
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learn::{AlphaSource, Exploration, Schedule};
+    use crate::mdp::streams::Stream;
+
+    fn table(q: QTable, alpha: f64, epsilon: f64) -> Tabular {
+        let alpha = AlphaSource::Schedule(Schedule::constant(alpha));
+        let behaviour = (Exploration::EpsilonGreedy, Schedule::constant(epsilon));
+        Tabular::new(q, 0.9, alpha, behaviour, Stream::new(0, "test"))
+    }
 
     /// State 0: action 0 is worth 1 and ends; state 1 is worth 4 or 2.
     fn learner(backup: Backup, phi: Vec<f64>) -> Advised {
         let q = QTable::from_values(2, vec![0.0, 1.0, 4.0, 2.0]);
-        let (alpha, epsilon) = (Schedule::constant(0.5), Schedule::constant(0.0));
-        let phi = QTable::from_values(2, phi);
-        Advised::new(backup, q, phi, 0.9, alpha, epsilon, Stream::new(0, "test"))
+        Advised::new(backup, table(q, 0.5, 0.0), QTable::from_values(2, phi))
     }
 
     #[test]
     fn a_step_by_hand() {
-        for backup in [Backup::Best, Backup::Played] {
+        for backup in [Backup::Best, Backup::Played, Backup::Expected] {
             // Corrected: (3, 1) and (4, 7).
             let mut agent = learner(backup, vec![3.0, 0.0, 0.0, 5.0]);
             assert_eq!(agent.begin(0), 0, "by the corrected values");
@@ -196,10 +188,8 @@ mod tests {
     /// Two arms paying 1 and 0, advice 2 for the first: Q_F = (-1, 0), whose greedy arm is wrong.
     #[test]
     fn a_bandit_by_hand() {
-        let (alpha, epsilon) = (Schedule::constant(1.0), Schedule::constant(1.0));
         let (zero, phi) = (QTable::new(1, 2, 0.0), QTable::from_values(2, vec![2.0, 0.0]));
-        let stream = Stream::new(0, "test");
-        let mut agent = Advised::new(Backup::Best, zero, phi, 0.9, alpha, epsilon, stream);
+        let mut agent = Advised::new(Backup::Best, table(zero, 1.0, 1.0), phi);
         for _ in 0..20 {
             let arm = agent.begin(0);
             agent.end([1.0, 0.0][arm], Last::<usize>::Terminated);
