@@ -7,10 +7,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
-use crate::experiment::{Audit, Effort, audit_thoroughly};
+use crate::experiment::{Audit, Thorough, audit_variant};
 use crate::report::audit_json::audit_json;
 use crate::report::audit_text::audit_text;
-use crate::report::claims::{broken_promises, judge_audits};
+use crate::report::claims::{broken_promises, judge_audits, rehearse};
 use crate::script::{Host, load};
 
 #[derive(Debug, ClapArgs)]
@@ -33,6 +33,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let plan = load(&args.script)?;
+    rehearse(&plan)?;
     let host = Host::open(&plan)?;
     for warning in &plan.warnings {
         diagnostic(warning);
@@ -50,15 +51,15 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let variants: Vec<_> = plan.variants.iter().filter(|v| asked(&v.name)).collect();
     for variant in &variants {
         let bar = bar(&variant.name);
-        let effort = Effort {
-            sampled_model: !args.quick,
+        let thorough = Thorough {
+            plan: &plan,
             threads: args.jobs.map_or(cores, usize::from),
             progress: &|done, total| {
                 bar.set_length(total as u64);
                 bar.set_position(done as u64);
             },
         };
-        let audit = audit_thoroughly(&host, &plan, variant, effort);
+        let audit = audit_variant(&host, variant, (!args.quick).then_some(thorough));
         bar.finish_and_clear();
         let audit = audit?;
         if !args.json {
@@ -71,7 +72,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let mut held = true;
     if args.variant.is_empty() {
-        for (text, holds) in judge_audits(&plan, &host, &audits)? {
+        for (text, holds) in judge_audits(&plan, &host, &audits) {
             note(&format!("{} {text}", if holds { "ok    " } else { "FAILED" }));
             held &= holds;
         }

@@ -51,7 +51,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         writeln!(out, "  {line}").expect(MEMORY);
     }
     writeln!(out, "  agent {}({})", variant.agent.spec.name, params.join(", ")).expect(MEMORY);
-    let audit = audit_variant(host, variant)?;
+    let audit = audit_variant(host, variant, None)?;
     exact(&audit, out);
     let look = look(variant)?;
     for (i, &seed) in variant.seeds.0.iter().enumerate() {

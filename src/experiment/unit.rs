@@ -22,6 +22,10 @@ use crate::shaping::{
 /// taken for new ones.
 pub const SEMANTICS: u32 = 1;
 
+/// Whether the commonest combinations get loops of their own. Not when debugging: they are most of
+/// what there is to compile, and the shared loop gives the same results.
+const OWN_LOOPS: bool = !cfg!(debug_assertions);
+
 /// A unit of work.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Unit {
@@ -127,14 +131,14 @@ impl EnvVisitor for RunUnit<'_> {
         let cells = match &variant.discretiser {
             DiscretiserSpec::StateIndex => {
                 let index = StateIndex { n_states: env.n_states().unwrap_or(0) };
-                if const { E::INDEXED } && shield.is_none() {
+                if const { OWN_LOOPS && E::INDEXED } && shield.is_none() {
                     return self.fast(env, index);
                 }
                 AnyCells::Index(index)
             }
             DiscretiserSpec::Bins(dims) => {
                 let bins = Bins::new(dims).expect("checked when the plan was resolved");
-                if const { !E::INDEXED } && shield.is_none() {
+                if const { OWN_LOOPS && !E::INDEXED } && shield.is_none() {
                     return self.fast(env, bins);
                 }
                 AnyCells::Bins(bins)

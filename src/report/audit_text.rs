@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::audit::{Certificate, Divergence, Path, Pathwise, Strict, Walk};
+use crate::audit::{Certificate, Divergence, Path, Pathwise, Strict, Walk, WalkStep};
 use crate::experiment::{Audit, AuditVerdict, Exact, Naming};
 use crate::mdp::Grid;
 use crate::script::Variant;
@@ -10,6 +10,8 @@ use crate::script::Variant;
 const MEMORY: &str = "writing to a string does not fail";
 /// States, steps and runs of actions that are listed one by one.
 const LISTED: usize = 12;
+/// Characters of a line, without what it is about.
+const WIDTH: usize = 84;
 
 /// Lines of a report, indented.
 #[derive(Default)]
@@ -18,13 +20,42 @@ pub(super) struct Lines(String);
 impl Lines {
     /// A line that begins with what it is about.
     pub(super) fn item(&mut self, what: &str, text: &str) {
-        writeln!(self.0, "  {what:<12} {text}").expect(MEMORY);
+        let mut label = what;
+        for line in wrapped(text) {
+            writeln!(self.0, "  {label:<12} {line}").expect(MEMORY);
+            label = "";
+        }
     }
 
     /// A line that belongs to the item before.
     pub(super) fn more(&mut self, text: &str) {
+        for (i, line) in wrapped(text).iter().enumerate() {
+            let indent = if i == 0 { "" } else { "    " };
+            writeln!(self.0, "  {:<12} {indent}{line}", "").expect(MEMORY);
+        }
+    }
+
+    /// A line that must not be broken, of a drawing.
+    fn drawn(&mut self, text: &str) {
         writeln!(self.0, "  {:<12} {text}", "").expect(MEMORY);
     }
+}
+
+/// `text` in lines of [`WIDTH`] characters, broken at blanks.
+fn wrapped(text: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let line = lines.last_mut().expect("there is one at least");
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > WIDTH {
+            lines.push(word.to_string());
+        } else {
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines
 }
 
 /// The report on one variant.
@@ -80,7 +111,10 @@ fn exactly(exact: &Exact, audit: &Audit, lines: &mut Lines) {
     if let Some(earned) = &audit.true_return {
         lines.item(
             "true return",
-            &format!("{:.4} of an optimal policy, {:.4} of one that is optimal for the shaped reward", earned.optimal, earned.shaped),
+            &format!(
+                "{:.4} of an optimal policy, {:.4} of one that is optimal for the shaped reward",
+                earned.optimal, earned.shaped
+            ),
         );
     }
     changed(exact, lines);
@@ -108,32 +142,42 @@ fn proof(certificate: &Certificate, naming: &Naming, lines: &mut Lines) {
             naming.state(certificate.start)
         ),
     );
-    for (name, walk) in [("one", &certificate.direct), ("other", &certificate.detour)] {
-        lines.more(&format!("the {name}, shaped by {} in all:", short(walk.sum)));
-        for line in walked(walk, naming) {
-            lines.more(&format!("  {line}"));
-        }
-    }
+    let (one, other) = (&certificate.direct, &certificate.detour);
+    // How the two go on alike.
+    let same = |(a, b): &(&WalkStep, &WalkStep)| (a.state, a.action) == (b.state, b.action);
+    let alike = one.steps.iter().rev().zip(other.steps.iter().rev()).take_while(same).count();
+    let tail = if alike > 1 && one.repeats_from.is_none() { alike } else { 0 };
+    lines.more(&format!("shaped by {}: {}", short(one.sum), walked(one, 0, naming)));
+    lines.more(&format!("shaped by {}: {}", short(other.sum), walked(other, tail, naming)));
 }
 
-/// A walk, a line for each step.
-pub(super) fn walked(walk: &Walk, naming: &Naming) -> Vec<String> {
-    let mut lines = Vec::new();
-    for (i, step) in walk.steps.iter().enumerate().take(LISTED) {
-        let to = if step.terminated { "ends in" } else { "to" };
-        let again = if walk.repeats_from == Some(i) { " (from here round and round)" } else { "" };
-        lines.push(format!(
-            "{}, {to} {}: reward {}, shaping {}{again}",
-            naming.action(step.action),
-            naming.state(step.next_state),
-            short(step.reward),
-            short(step.shaping)
-        ));
+/// A walk as its actions, what each changes and what shaping adds, but for the last `left_out`.
+pub(super) fn walked(walk: &Walk, left_out: usize, naming: &Naming) -> String {
+    let step = |(i, step): (usize, &WalkStep)| {
+        let change = if step.terminated {
+            "the end".into()
+        } else {
+            naming.change(step.state, step.next_state)
+        };
+        let paid = match short(step.shaping) {
+            zero if zero == "0" => String::new(),
+            paid if step.shaping > 0.0 => format!(" +{paid}"),
+            paid => format!(" {paid}"),
+        };
+        let round = if walk.repeats_from == Some(i) { "[for ever: " } else { "" };
+        format!("{round}{} ({change}){paid}", naming.action(step.action))
+    };
+    let own = walk.steps.len() - left_out;
+    let mut steps: Vec<String> =
+        walk.steps[..own].iter().enumerate().take(LISTED).map(step).collect();
+    if own > LISTED {
+        steps.push(format!("… {} more", own - LISTED));
     }
-    if walk.steps.len() > LISTED {
-        lines.push(format!("… {} more steps", walk.steps.len() - LISTED));
+    if left_out > 0 {
+        steps.push("then the same".into());
     }
-    lines
+    let close = if walk.repeats_from.is_some() { "]" } else { "" };
+    format!("{}{close}", steps.join(", "))
 }
 
 /// What trajectories showed.
@@ -206,14 +250,13 @@ fn changed(exact: &Exact, lines: &mut Lines) {
     if let Some(grid) = &naming.schema.grid {
         lines.item("changes", "greedy actions, without > with shaping, where they differ:");
         for line in drawn(grid, &compared.states_changed, &compared.plain, &compared.shaped) {
-            lines.more(&line);
+            lines.drawn(&line);
         }
         return;
     }
     lines.item("changes", "greedy actions, without > with shaping:");
-    let names = |set: &[usize]| {
-        set.iter().map(|&a| naming.action(a)).collect::<Vec<_>>().join(" or ")
-    };
+    let names =
+        |set: &[usize]| set.iter().map(|&a| naming.action(a)).collect::<Vec<_>>().join(" or ");
     for &s in compared.states_changed.iter().take(LISTED) {
         lines.more(&format!(
             "{}: {} > {}",
@@ -227,7 +270,12 @@ fn changed(exact: &Exact, lines: &mut Lines) {
     }
 }
 
-fn drawn(grid: &Grid, changed: &[usize], plain: &[Vec<usize>], shaped: &[Vec<usize>]) -> Vec<String> {
+fn drawn(
+    grid: &Grid,
+    changed: &[usize],
+    plain: &[Vec<usize>],
+    shaped: &[Vec<usize>],
+) -> Vec<String> {
     let arrows = |set: &[usize]| set.iter().map(|&a| grid.arrows[a]).collect::<String>();
     let cols = grid.rows.first().map_or(0, |row| row.chars().count());
     let cell = |s: usize, tile: char| {

@@ -14,6 +14,8 @@
 //! - `legend`: the legend of the curves
 //! - `svg`: scales, ticks and escaping for hand-written SVG
 
+pub mod audit_json;
+pub mod audit_text;
 pub mod claims;
 pub mod closing;
 mod colours;

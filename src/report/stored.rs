@@ -229,7 +229,7 @@ impl Stored {
             let window = variant.window as usize;
             let summary = summarise(&variant.name, &returns, &lengths, window, variant.threshold);
             findings.summaries.push(summary);
-            findings.audits.push(audit_variant(host, variant)?);
+            findings.audits.push(audit_variant(host, variant, None)?);
             findings.steps_per_second.push(rate(&times, present, i));
             let seeds = SeedList(own.iter().map(|u| u.seed).collect());
             plan.variants.push(Variant { seeds, ..variant.clone() });

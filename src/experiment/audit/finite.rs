@@ -7,11 +7,12 @@ use super::named::Naming;
 use super::replacement::replacement;
 use super::{Audit, AuditVerdict, beyond_states};
 use crate::audit::{
-    Finding, Pathwise, PathwiseSettings, Pattern, Preservation, Strict, Verdict, pathwise, pattern,
-    preservation, strict,
+    Advantages, Expected, Finding, Pathwise, PathwiseSettings, Pattern, Preservation, Scaling,
+    Strict, pathwise, pattern, preservation, strict,
 };
 use crate::experiment::assemble::{NotAModelError, learned_model};
 use crate::experiment::shielded::playable;
+use crate::learn::planning::{Dynamics, Over};
 use crate::mdp::Env;
 use crate::script::{Host, Variant};
 use crate::shaping::Fault;
@@ -40,6 +41,12 @@ pub struct Exact {
     pub states: usize,
     /// Transition by transition; `None` if the reward is no function of the transition.
     pub strict: Option<Strict>,
+    /// In expectation over the outcomes of each action; `None` without a value of the uniform policy.
+    pub expected: Option<Expected>,
+    /// The learned reward as a multiple of the native one, up to a potential.
+    pub scaling: Option<Scaling>,
+    /// The STARC distance of the learned from the native reward.
+    pub starc: Option<f64>,
     /// The kind of term that is added.
     pub pattern: Pattern,
     /// Both models solved and compared; `None` if they cannot be.
@@ -64,6 +71,9 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         gamma,
         states: reachable.iter().filter(|r| **r).count(),
         strict: None,
+        expected: None,
+        scaling: None,
+        starc: None,
         pattern: Pattern::Other,
         preservation: None,
         pathwise: None,
@@ -85,13 +95,15 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     let declares = variant.potential.is_some() || variant.shaping.shift != 0.0;
     let declared = declares.then_some(&*model.phi);
     let checked = strict(mdp, &f, gamma, &reachable, declared);
+    let dynamics = Dynamics::new(mdp, Over::Reachable);
+    if let Ok(advantages) = Advantages::new(mdp, &dynamics, &f, gamma) {
+        exact.expected = Some(advantages.expected(declared));
+        exact.scaling = Some(advantages.scaling());
+        exact.starc = Some(advantages.starc());
+    }
     let potential_only = !variant.changes_reward();
     let compared = preservation(mdp, &model.shaped, gamma, &model.phi);
-    let preserved = compared.as_ref().ok().and_then(|p| match p.verdict {
-        Verdict::Preserved => Some(true),
-        Verdict::Changed => Some(false),
-        Verdict::Inconclusive => None,
-    });
+    let preserved = compared.as_ref().ok().and_then(|p| p.verdict.preserved());
     let (verdict, basis) = match (checked.finding, preserved) {
         (Finding::Holds, Some(true)) if potential_only => (
             AuditVerdict::PotentialBased,

@@ -1,5 +1,6 @@
 //! What a variant adds to the native reward, step by step, as the training loop computes it.
 
+use crate::audit::Asked;
 use crate::experiment::{assemble, shaped};
 use crate::mdp::Env;
 use crate::script::{DiscretiserSpec, Host, Variant};
@@ -16,6 +17,34 @@ pub(super) struct Learned<E: Env> {
     clip: Option<[f64; 2]>,
     gamma: f64,
     terms: Vec<f64>,
+}
+
+impl<E: Env + 'static> Learned<E> {
+    /// Its parts, as samples of a discretised environment ask for them.
+    pub(super) fn into_asked(self) -> Asked<'static, E> {
+        let Self { mut reward, mut potential, cells, clip, mut terms, .. } = self;
+        let mut cells = cells.expect("only discretised environments are sampled");
+        Asked {
+            cell: Box::new(move |env, obs| cells.see(env, obs)),
+            phi: Box::new(move |env, cell, obs| potential.phi(env, cell, obs)),
+            extra: Box::new(move |env, t| extra(&mut reward, clip, &mut terms, env, t)),
+        }
+    }
+}
+
+/// The reward learned from, less the native one and without the potential's part.
+fn extra<E: Env>(
+    reward: &mut AnyReward<E>,
+    clip: Option<[f64; 2]>,
+    terms: &mut [f64],
+    env: &E,
+    t: &Transition<'_, E::Obs>,
+) -> Result<f64, Fault> {
+    let mut learned = reward.reward(env, t, terms)?;
+    if let Some([low, high]) = clip {
+        learned = learned.clamp(low, high);
+    }
+    Ok(learned - t.reward)
 }
 
 impl<E: Env + Clone + 'static> Learned<E> {
@@ -49,17 +78,8 @@ impl<E: Env + Clone + 'static> Learned<E> {
         })
     }
 
-    /// The reward learned from, less the native one and without the potential's part.
-    pub(super) fn extra(&mut self, env: &E, t: &Transition<'_, E::Obs>) -> Result<f64, Fault> {
-        let mut reward = self.reward.reward(env, t, &mut self.terms)?;
-        if let Some([low, high]) = self.clip {
-            reward = reward.clamp(low, high);
-        }
-        Ok(reward - t.reward)
-    }
-
     /// Φ of a state that is not terminal.
-    pub(super) fn phi(&mut self, env: &E, obs: &E::Obs) -> Result<f64, Fault> {
+    fn phi(&mut self, env: &E, obs: &E::Obs) -> Result<f64, Fault> {
         let cell = match &mut self.cells {
             Some(cells) => cells.see(env, obs)?,
             None => 0,
@@ -69,7 +89,7 @@ impl<E: Env + Clone + 'static> Learned<E> {
 
     /// Everything that is added to the native reward.
     pub(super) fn added(&mut self, env: &E, t: &Transition<'_, E::Obs>) -> Result<f64, Fault> {
-        let extra = self.extra(env, t)?;
+        let extra = extra(&mut self.reward, self.clip, &mut self.terms, env, t)?;
         if matches!(self.potential, AnyPotential::No(_)) {
             return Ok(extra);
         }

@@ -13,10 +13,10 @@ use super::assemble::diagnostic_of;
 use crate::audit::{Pathwise, Preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
-use crate::script::{AdviceOn, Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+use crate::script::{AdviceOn, Diagnostic, DiscretiserSpec, Host, PhiOn, Plan, Variant};
 use crate::shaping::Fault;
 
-pub use continuous::Continuous;
+pub use continuous::{Continuous, SampledModel};
 pub use finite::{Exact, TrueReturn};
 pub use named::Naming;
 
@@ -130,41 +130,31 @@ impl Audit {
     }
 }
 
-/// How much is looked into.
+/// How much is looked into: whether a discretised environment is sampled and solved, which takes
+/// seconds.
 #[derive(Clone, Copy)]
-pub struct Effort<'a> {
-    /// Whether a discretised environment is sampled and solved, which takes seconds.
-    pub sampled_model: bool,
-    /// Threads for that.
+pub struct Thorough<'a> {
+    /// Where the script's functions are found, once more for each thread.
+    pub plan: &'a Plan,
+    /// Threads.
     pub threads: usize,
     /// Hears how much of it is done, of how much.
     pub progress: &'a (dyn Fn(usize, usize) + Sync),
 }
 
-impl Effort<'_> {
-    /// What every run of a script can afford.
-    pub const QUICK: Self = Self { sampled_model: false, threads: 1, progress: &|_, _| {} };
-}
-
-/// Judges the shaping of `variant` in little time: see [`audit_thoroughly`].
-///
-/// # Errors
-/// If a callback fails.
-pub fn audit_variant(host: &Host, variant: &Variant) -> Result<Audit, Diagnostic> {
-    audit_thoroughly(host, variant, Effort::QUICK)
-}
-
 /// Judges the shaping of `variant`.
 ///
 /// On a finite environment both models are solved and compared. Elsewhere a potential that the host
-/// evaluates is potential-based by construction, and other rewards are tried on trajectories.
+/// evaluates is potential-based by construction, and other rewards are tried on trajectories; if
+/// `thorough`, a discretised environment is sampled and solved besides. That never changes the
+/// verdict, for it is about the sampled model only.
 ///
 /// # Errors
 /// If a callback fails.
-pub fn audit_thoroughly(
+pub fn audit_variant(
     host: &Host,
     variant: &Variant,
-    effort: Effort<'_>,
+    thorough: Option<Thorough<'_>>,
 ) -> Result<Audit, Diagnostic> {
     if !variant.is_shaped() && !variant.changes_reward() {
         let basis = "the agent learns from the native reward";
@@ -174,7 +164,7 @@ pub fn audit_thoroughly(
         return Ok(look_back(variant));
     }
     let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
-    env.visit(Judge { host, variant, effort }).map_err(|fault| {
+    env.visit(Judge { host, variant, thorough }).map_err(|fault| {
         host.annotate(diagnostic_of(fault).note(format!("in variant `{}`", variant.name)))
     })
 }
@@ -182,24 +172,26 @@ pub fn audit_thoroughly(
 struct Judge<'a> {
     host: &'a Host,
     variant: &'a Variant,
-    effort: Effort<'a>,
+    thorough: Option<Thorough<'a>>,
 }
 
 impl EnvVisitor for Judge<'_> {
     type Out = Result<Audit, Fault>;
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
-        let Self { host, variant, effort } = self;
+        let Self { host, variant, thorough } = self;
         let indexed = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
         if indexed && variant.frame_skip == 1 && env.finite().is_some() {
             return finite::judge(host, variant, &env);
         }
-        let audit = if variant.changes_reward() {
+        let mut audit = if variant.changes_reward() {
             continuous::try_out(host, variant, &env)?
         } else {
             by_construction(variant)
         };
-        let _ = effort;
+        if let Some(thorough) = thorough {
+            continuous::model(variant, &env, thorough, &mut audit)?;
+        }
         Ok(audit)
     }
 }
