@@ -18,6 +18,7 @@ mod landscape;
 pub mod play;
 mod predict;
 mod record;
+mod shaped;
 mod shielded;
 mod starts;
 mod store;

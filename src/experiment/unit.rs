@@ -8,7 +8,7 @@ use super::assemble::Assembled;
 use super::predict::Exact;
 use super::record::{EpisodeRow, StateValues, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
-use super::{assemble, hex};
+use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
 use crate::learn::{AnyAgent, Learn};
@@ -182,7 +182,7 @@ impl RunUnit<'_> {
     ) -> Result<Parts<E>, UnitError> {
         let (host, variant, seed) = (self.host, self.variant, self.seed);
         let fault = |f| UnitError::fault(variant, seed, f);
-        let potential = assemble::potential(host, variant, env, n_cells).map_err(fault)?;
+        let potential = shaped::potential(host, variant, env, n_cells).map_err(fault)?;
         let reward = assemble::reward(host, variant, env).map_err(fault)?;
         let Assembled { agent, sweeps, exact } =
             assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::learned::Learned;
 use super::named::Naming;
 use super::replacement::replacement;
-use super::{Audit, AuditVerdict};
+use super::{Audit, AuditVerdict, beyond_states};
 use crate::audit::{
     Advantages, Expected, Finding, Pathwise, PathwiseSettings, Pattern, Preservation, Scaling,
     Strict, pathwise, pattern, preservation, strict,
@@ -64,6 +64,7 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     env: &E,
 ) -> Result<Audit, Fault> {
     let mdp = env.finite().expect("only asked of finite environments");
+    let mdp = &playable(host, variant, env, (**mdp).clone())?;
     let gamma = variant.agent.float("gamma");
     let mut exact = Exact {
         gamma,
@@ -87,13 +88,13 @@ pub(super) fn judge<E: Env + Clone + 'static>(
             };
         }
     };
-    let mdp = &playable(host, variant, env, (**mdp).clone())?;
     let reachable = mdp.reachable();
     exact.states = reachable.iter().filter(|r| **r).count();
     let added = model.shaped.outcomes().iter().zip(mdp.outcomes());
     let f: Vec<f64> = added.map(|(shaped, plain)| shaped.reward - plain.reward).collect();
     exact.pattern = pattern(mdp, &f, &reachable);
-    let declared = variant.potential.is_some().then_some(&*model.phi);
+    let declares = variant.potential.is_some() || variant.shaping.shift != 0.0;
+    let declared = declares.then_some(&*model.phi);
     let checked = strict(mdp, &f, gamma, &reachable, declared);
     let dynamics = Dynamics::new(mdp, Over::Reachable);
     if let Ok(advantages) = Advantages::new(mdp, &dynamics, &f, gamma) {
@@ -107,7 +108,9 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     let (verdict, basis) = match (checked.finding, preserved) {
         (Finding::Holds, Some(true)) if potential_only => (
             AuditVerdict::PotentialBased,
-            "exact: Q_F + Φ = Q and the greedy sets are equal".into(),
+            beyond_states(variant)
+                .unwrap_or("exact: Q_F + Φ = Q and the greedy sets are equal")
+                .into(),
         ),
         (Finding::Holds, Some(true)) => (
             AuditVerdict::PotentialBased,
