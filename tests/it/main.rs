@@ -18,6 +18,7 @@ mod scripts;
 mod setting;
 mod shaping;
 mod show;
+mod solved;
 mod support;
 mod toy_text;
 mod unreadable;
