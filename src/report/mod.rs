@@ -29,6 +29,7 @@ pub mod picture;
 pub mod picture_svg;
 pub mod results;
 mod runs;
+pub mod score;
 pub mod stored;
 pub mod summary;
 mod svg;

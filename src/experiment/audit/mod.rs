@@ -16,6 +16,7 @@ use crate::mdp::Env;
 use crate::script::{AdviceOn, Diagnostic, DiscretiserSpec, Host, PhiOn, Plan, Variant};
 use crate::shaping::Fault;
 
+pub(super) use continuous::sample;
 pub use continuous::{Continuous, SampledModel};
 pub use finite::{Exact, TrueReturn};
 pub use named::Naming;

@@ -54,7 +54,7 @@ fn wrapped(text: &str) -> Vec<String> {
 }
 
 /// A number with four significant digits at most, without the noise of rounding errors.
-pub(super) fn short(x: f64) -> String {
+pub(in crate::report) fn short(x: f64) -> String {
     if x == 0.0 || x.abs() < 1e-12 {
         return "0".into();
     }

@@ -13,7 +13,8 @@ use crate::experiment::{Audit, AuditVerdict, Exact};
 use crate::mdp::Grid;
 use crate::script::Variant;
 use consequences::{consequences, similarity};
-use lines::{LISTED, Lines, short};
+pub(super) use lines::short;
+use lines::{LISTED, Lines};
 use proof::{proof, sampled, ways};
 
 /// The report on one variant.
