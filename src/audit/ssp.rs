@@ -69,7 +69,6 @@ impl SspCheck {
             let payoff = Payoff::of(dynamics, rewards, &component);
             let states = || component.states.iter().map(|&place| dynamics.state(place)).collect();
             match payoff.sign {
-                Sign::Negative => {}
                 Sign::Positive => {
                     let cycle = best_cycle(dynamics, [rewards, native], &payoff);
                     let why = NotSsp::PayingLoop { payoff: payoff.bounds, cycle };
@@ -81,7 +80,7 @@ impl SspCheck {
                 Sign::Unclear if result == Self::Fine => {
                     result = Self::Inconclusive { component: states(), payoff: payoff.bounds };
                 }
-                Sign::Unclear => {}
+                Sign::Negative | Sign::Unclear => {}
             }
         }
         result
