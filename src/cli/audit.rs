@@ -8,8 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::{Audit, Thorough, audit_variant};
-use crate::report::audit_json::audit_json;
-use crate::report::audit_text::audit_text;
+use crate::report::audit::{audit_json, audit_text};
 use crate::report::claims::{broken_promises, judge_audits, rehearse};
 use crate::script::{Host, load};
 

@@ -16,8 +16,11 @@ mod execute;
 pub mod golden;
 mod landscape;
 pub mod play;
+mod predict;
 mod record;
+mod shaped;
 mod shielded;
+mod starts;
 mod store;
 mod train;
 mod unit;
@@ -38,7 +41,8 @@ pub use audit::{
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use landscape::{Landscape, ListedState};
-pub use record::{EpisodeRow, Learned, UnitRecord};
+pub use predict::has_exact_values;
+pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
 pub use store::{
     Store, StoreError, StoredUnit, read_table, write_atomically, write_atomically_with,
 };

@@ -1,7 +1,7 @@
 //! What a variant adds to the native reward, step by step, as the training loop computes it.
 
 use crate::audit::Asked;
-use crate::experiment::assemble;
+use crate::experiment::{assemble, shaped};
 use crate::mdp::Env;
 use crate::script::{DiscretiserSpec, Host, Variant};
 use crate::shaping::{
@@ -65,9 +65,12 @@ impl<E: Env + Clone + 'static> Learned<E> {
             }
         };
         let n_cells = cells.as_ref().map_or(1, Discretiser::<E>::n_cells);
+        let mut potential = shaped::potential(host, variant, env, n_cells)?;
+        // A potential that changes is what it is at the end.
+        Potential::<E>::begin_episode(&mut potential, variant.episodes);
         Ok(Self {
             reward: assemble::scripted_reward(host, variant, env),
-            potential: assemble::potential(host, variant, env, n_cells)?,
+            potential,
             cells,
             clip: variant.clip_reward,
             gamma: variant.agent.float("gamma"),

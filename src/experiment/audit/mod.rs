@@ -10,10 +10,10 @@ mod replacement;
 use serde::Serialize;
 
 use super::assemble::diagnostic_of;
-use crate::audit::{Pathwise, Preservation};
+use crate::audit::{Critical, Pathwise, Preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
-use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Plan, Variant};
+use crate::script::{AdviceOn, Diagnostic, DiscretiserSpec, Host, PhiOn, Plan, Variant};
 use crate::shaping::Fault;
 
 pub use continuous::{Continuous, SampledModel};
@@ -63,6 +63,11 @@ pub struct Audit {
     /// What the best policy earns, and what the policy that is best for the shaped reward earns, in
     /// the environment's own reward, where the model is known.
     pub true_return: Option<TrueReturn>,
+    /// How far the added reward could be scaled before the optimal actions change, where the model is
+    /// known and the reward is no potential's.
+    pub critical: Option<Critical>,
+    /// Whether there is a loop that pays better than the task, where the model is known.
+    pub exploitable: Option<bool>,
     /// On what the verdict rests, in one line.
     pub basis: String,
     /// What a potential could do in its place, if it is none.
@@ -87,6 +92,8 @@ impl Audit {
             states_changed: None,
             identity_holds: None,
             true_return: None,
+            critical: None,
+            exploitable: None,
             basis: basis.into(),
             instead: None,
             exact: None,
@@ -100,6 +107,8 @@ impl Audit {
             states_changed: Some(0),
             identity_holds: Some(true),
             true_return: Some(TrueReturn::made_up()),
+            critical: Some(Critical { k: None, breaks_ties: false }),
+            exploitable: Some(false),
             ..Self::new(AuditVerdict::PotentialBased, Some(true), "made up")
         }
     }
@@ -156,9 +165,12 @@ pub fn audit_variant(
     variant: &Variant,
     thorough: Option<Thorough<'_>>,
 ) -> Result<Audit, Diagnostic> {
-    if variant.potential.is_none() && !variant.changes_reward() {
+    if !variant.is_shaped() && !variant.changes_reward() {
         let basis = "the agent learns from the native reward";
         return Ok(Audit::new(AuditVerdict::Unshaped, Some(true), basis));
+    }
+    if variant.shaping.advice.is_some() && variant.shaping.advice_on == AdviceOn::LookBack {
+        return Ok(look_back(variant));
     }
     let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     env.visit(Judge { host, variant, thorough }).map_err(|fault| {
@@ -193,16 +205,41 @@ impl EnvVisitor for Judge<'_> {
     }
 }
 
+/// What a learner knows of advice on the step before is gone when it bootstraps.
+fn look_back(variant: &Variant) -> Audit {
+    let basis = if variant.agent.spec.is_one_step() {
+        "look-back advice: a learner that bootstraps does not take all of it back"
+    } else {
+        "look-back advice is taken back over whole returns only"
+    };
+    Audit::new(AuditVerdict::Inconclusive, None, basis)
+}
+
+/// Why the optimal policy survives a shaping that is no function of the state alone.
+fn beyond_states(variant: &Variant) -> Option<&'static str> {
+    if variant.shaping.advice.is_some() {
+        Some("by construction: actions are chosen by Q_F + Φ(s, a)")
+    } else if variant.shaping.learned.is_some() {
+        Some("by construction: Q_F = Q − η / (1 + η) V where it settles")
+    } else if variant.is_dynamic() {
+        Some("by construction: Φ of an arrival is what is taken back when leaving")
+    } else {
+        None
+    }
+}
+
 /// Where the host itself adds γΦ(s′) − Φ(s), and nothing else is added.
 fn by_construction(variant: &Variant) -> Audit {
-    let (preserved, basis) = match (&variant.discretiser, variant.potential_on) {
-        (DiscretiserSpec::StateIndex, _) => {
+    let raw = variant.potential.is_some() && variant.potential_on == PhiOn::Raw;
+    let (preserved, basis) = match (&variant.discretiser, raw, beyond_states(variant)) {
+        (DiscretiserSpec::StateIndex, _, Some(why)) | (_, false, Some(why)) => (Some(true), why),
+        (DiscretiserSpec::StateIndex, _, None) => {
             (Some(true), "by construction: Φ is a function of the state")
         }
-        (_, PhiOn::Cell) => {
+        (_, false, None) => {
             (Some(true), "by construction, for the discretised problem: Φ is constant on each cell")
         }
-        (_, PhiOn::Raw) => (
+        (_, true, _) => (
             None,
             "by construction, for the true states; on cells, where Φ is not constant, the greedy \
              policy may change",

@@ -70,7 +70,11 @@ fn telling(states: &[Vec<f64>], n_fields: usize) -> usize {
         let bits = |fields: &Vec<f64>| fields[..n].iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         states.iter().map(bits).collect::<BTreeSet<_>>().len() == states.len()
     };
-    if states.is_empty() { n_fields } else { (1..n_fields).find(|&n| distinct(n)).unwrap_or(n_fields) }
+    if states.is_empty() {
+        n_fields
+    } else {
+        (1..n_fields).find(|&n| distinct(n)).unwrap_or(n_fields)
+    }
 }
 
 fn number(field: &Field, x: f64) -> String {

@@ -1,0 +1,34 @@
+//! The policies whose values are learned.
+
+use crate::learn::Seen;
+use crate::learn::greedy::pick_allowed;
+use crate::mdp::Action;
+use crate::mdp::streams::Stream;
+
+/// A policy that is given, not learned.
+#[derive(Debug, Clone)]
+pub enum GivenPolicy {
+    /// Every action that is allowed with the same probability.
+    Random {
+        /// Number of actions.
+        n_actions: usize,
+        /// Its randomness.
+        stream: Stream,
+    },
+    /// One action per state.
+    Fixed(Vec<Action>),
+}
+
+impl GivenPolicy {
+    /// The action in `s`.
+    #[inline]
+    pub fn choose<S: Seen>(&mut self, s: S) -> Action {
+        match self {
+            Self::Random { n_actions, stream } if S::SHIELDED => {
+                pick_allowed(*n_actions, s, stream.uniform())
+            }
+            Self::Random { n_actions, stream } => stream.below(*n_actions),
+            Self::Fixed(actions) => actions[s.cell()],
+        }
+    }
+}
