@@ -20,7 +20,7 @@ use crate::shaping::{
 
 /// Raised whenever the same configuration gives other results than before: old units are then not
 /// taken for new ones.
-pub const SEMANTICS: u32 = 1;
+pub const SEMANTICS: u32 = 2;
 
 /// A unit of work.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -17,6 +17,7 @@ mod render;
 mod scripts;
 mod setting;
 mod shaping;
+mod shield;
 mod show;
 mod support;
 mod toy_text;
