@@ -19,6 +19,7 @@ mod scripts;
 mod setting;
 mod shaping;
 mod shaping_figures;
+mod shield;
 mod show;
 mod solved;
 mod support;
