@@ -9,7 +9,7 @@
 //! those are real but below `1e-8` of the shaped model's scale, its ties prove nothing either.
 
 use crate::learn::QTable;
-use crate::learn::planning::{PolicyIteration, PolicyValueError};
+use crate::learn::planning::{PlanError, Planner, PolicyIteration};
 use crate::mdp::FiniteMdp;
 
 /// What comes of the comparison.
@@ -21,6 +21,17 @@ pub enum Verdict {
     Changed,
     /// Rounding could explain the difference, or its absence.
     Inconclusive,
+}
+
+impl Verdict {
+    /// Whether the greedy sets are equal; `None` if the numbers cannot tell.
+    pub fn preserved(self) -> Option<bool> {
+        match self {
+            Self::Preserved => Some(true),
+            Self::Changed => Some(false),
+            Self::Inconclusive => None,
+        }
+    }
 }
 
 /// A comparison of two models that differ in their rewards.
@@ -56,11 +67,12 @@ pub fn preservation(
     shaped: &FiniteMdp,
     gamma: f64,
     phi: &[f64],
-) -> Result<Preservation, PolicyValueError> {
+) -> Result<Preservation, PlanError> {
     let reachable = plain.reachable();
-    let q = PolicyIteration { gamma }.solve(plain)?;
-    let q_shaped = PolicyIteration { gamma }.solve(shaped)?;
     let zero = vec![0.0; phi.len()];
+    let minus_phi: Vec<f64> = phi.iter().map(|phi| -phi).collect();
+    let q = PolicyIteration { gamma }.solve(plain, &zero)?.q;
+    let q_shaped = PolicyIteration { gamma }.solve(shaped, &minus_phi)?.q;
     let scale = scale_of(plain, &q, &zero, &reachable);
     let scale_shaped = scale_of(shaped, &q_shaped, phi, &reachable);
     let (mut identity_error, mut uncertain) = (0.0f64, false);

@@ -51,7 +51,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         writeln!(out, "  {line}").expect(MEMORY);
     }
     writeln!(out, "  agent {}({})", variant.agent.spec.name, params.join(", ")).expect(MEMORY);
-    let audit = audit_variant(host, variant)?;
+    let audit = audit_variant(host, variant, None)?;
     exact(&audit, out);
     let look = look(variant)?;
     for (i, &seed) in variant.seeds.0.iter().enumerate() {
@@ -81,7 +81,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
 
 fn exact(audit: &Audit, out: &mut String) {
     writeln!(out, "  shaping {}: {}", audit.label(), audit.basis).expect(MEMORY);
-    if let Some(exact) = &audit.exact {
+    if let Some(exact) = audit.preservation() {
         let holds = if exact.identity_holds() { "holds" } else { "does not hold" };
         writeln!(
             out,

@@ -2,8 +2,8 @@
 
 use super::assemble::{NotAModelError, diagnostic_of, for_each_cell, learned_model, shield};
 use crate::env::EnvVisitor;
-use crate::learn::planning::{Planner, ValueIteration, policy_value};
-use crate::learn::{ParamValue, argmax_tol};
+use crate::learn::ParamValue;
+use crate::learn::planning::{Over, Planner, Policy, ValueIteration, policy_value};
 use crate::mdp::{Action, Env, FiniteMdp, Outcome};
 use crate::script::{Diagnostic, DiscretiserSpec, Host, Variant};
 use crate::shaping::Fault;
@@ -22,8 +22,8 @@ pub(super) fn given_policy<E: Env + Clone + 'static>(
             let gamma = variant.agent.float("gamma");
             let planner = ValueIteration { gamma, theta: 1e-12, max_sweeps: 100_000 };
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
-            let q = planner.solve(&model.shaped, &v0).q;
-            Ok(Some((0..n_cells).map(|s| argmax_tol(q.row(s))).collect()))
+            let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
+            Ok(Some(solution.policy))
         }
         _ => Ok(None),
     }
@@ -82,10 +82,13 @@ impl Exact {
         let chain = chain(&mdp, &shares(host, variant, env, &mdp, policy)?);
         let reached = chain.reachable();
         let gamma = variant.agent.float("gamma");
-        let Ok(v) = policy_value(&chain, gamma, &vec![0; chain.n_states()]) else {
+        let only = vec![0; chain.n_states()];
+        let Ok(value) = policy_value(&chain, gamma, Policy::Deterministic(&only), Over::Reachable)
+        else {
             return Ok(None);
         };
-        let v: Vec<Option<f64>> = v.iter().zip(&reached).map(|(v, r)| r.then_some(*v)).collect();
+        let v: Vec<Option<f64>> =
+            value.v.iter().zip(&reached).map(|(v, r)| r.then_some(*v)).collect();
         let reached = v.iter().enumerate().filter_map(|(s, v)| v.map(|v| (s, v))).collect();
         Ok(Some(Self { v, reached }))
     }

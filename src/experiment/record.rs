@@ -12,7 +12,7 @@ pub struct EpisodeRow {
     pub native: f64,
     /// Learned return: the undiscounted sum of what the agent learned from.
     pub learned: f64,
-    /// The potential's part of the learned return.
+    /// The part of the learned return that potentials and advice make up.
     pub shaping: f64,
     /// Each extra term's part of the learned return, in the order of their names.
     pub terms: Vec<f64>,

@@ -82,7 +82,8 @@ const STOP_INTERVAL: u32 = 1 << 16;
 ///
 /// The reward learned from is `reward(t) + γΦ(s′) − Φ(s)`, with Φ(s′) = 0 on termination. On
 /// truncation Φ(s′) is kept if and only if the agent bootstraps from s′: both sides must speak of
-/// the same continuation, or the fixed point moves.
+/// the same continuation, or the fixed point moves. What the agent adds itself
+/// ([`Agent::shaping`](crate::learn::Agent::shaping)) is counted with it.
 ///
 /// # Errors
 /// If a callback fails, returns stop being finite, or `stop` is raised.
@@ -106,6 +107,7 @@ where
         if stop.load(Ordering::Relaxed) {
             return Err(TrainError::Interrupted);
         }
+        world.potential.begin_episode(episode + 1);
         match play(world, agent, limits, starts.as_mut(), rng, stop) {
             Ok(row) if !row.learned.is_finite() => return Err(TrainError::NotFinite { episode }),
             Ok(row) => each(row, agent),
@@ -221,6 +223,9 @@ where
                     Some(next) => (Last::Truncated(next), Ending::Truncated),
                 };
                 agent.end(r, last);
+                let own = agent.shaping();
+                learned += own;
+                shaping += own;
                 return Ok(EpisodeRow {
                     steps: step,
                     native,

@@ -8,7 +8,7 @@ use super::assemble::Assembled;
 use super::predict::Exact;
 use super::record::{EpisodeRow, StateValues, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
-use super::{assemble, hex};
+use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
 use crate::learn::{AnyAgent, Learn};
@@ -23,6 +23,10 @@ use crate::shaping::{
 /// Raised whenever the same configuration gives other results than before: old units are then not
 /// taken for new ones.
 pub const SEMANTICS: u32 = 1;
+
+/// Whether the commonest combinations get loops of their own. Not when debugging: they are most of
+/// what there is to compile, and the shared loop gives the same results.
+const OWN_LOOPS: bool = !cfg!(debug_assertions);
 
 /// A unit of work.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -129,14 +133,14 @@ impl EnvVisitor for RunUnit<'_> {
         let cells = match &variant.discretiser {
             DiscretiserSpec::StateIndex => {
                 let index = StateIndex { n_states: env.n_states().unwrap_or(0) };
-                if const { E::INDEXED } && shield.is_none() {
+                if const { OWN_LOOPS && E::INDEXED } && shield.is_none() {
                     return self.fast(env, index);
                 }
                 AnyCells::Index(index)
             }
             DiscretiserSpec::Bins(dims) => {
                 let bins = Bins::new(dims).expect("checked when the plan was resolved");
-                if const { !E::INDEXED } && shield.is_none() {
+                if const { OWN_LOOPS && !E::INDEXED } && shield.is_none() {
                     return self.fast(env, bins);
                 }
                 AnyCells::Bins(bins)
@@ -178,7 +182,7 @@ impl RunUnit<'_> {
     ) -> Result<Parts<E>, UnitError> {
         let (host, variant, seed) = (self.host, self.variant, self.seed);
         let fault = |f| UnitError::fault(variant, seed, f);
-        let potential = assemble::potential(host, variant, env, n_cells).map_err(fault)?;
+        let potential = shaped::potential(host, variant, env, n_cells).map_err(fault)?;
         let reward = assemble::reward(host, variant, env).map_err(fault)?;
         let Assembled { agent, sweeps, exact } =
             assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;

@@ -49,6 +49,14 @@ pub fn max_allowed<S: Seen>(row: &[f64], s: S) -> f64 {
     best
 }
 
+/// The first action whose value is the largest among those that `s` allows, to the last bit: what
+/// [`max_allowed`] is the value of.
+#[inline]
+pub(super) fn argmax_exact<S: Seen>(row: &[f64], s: S) -> Action {
+    let best = max_allowed(row, s);
+    (0..row.len()).find(|&a| s.allows(a) && row[a] == best).unwrap_or(0)
+}
+
 /// [`argmax_tol`] among the actions that `s` allows.
 #[inline]
 pub fn argmax_allowed<S: Seen>(row: &[f64], s: S) -> Action {

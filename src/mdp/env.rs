@@ -58,7 +58,7 @@ pub struct Step<O> {
 ///
 /// All randomness comes from the generator that is passed in, which stands for Gymnasium's
 /// `np_random`; the same seed therefore gives Gymnasium's own trajectory.
-pub trait Env: Send {
+pub trait Env: Send + Sync {
     /// An observation: an array of float32 as Gymnasium returns it, or a state index.
     type Obs: Copy + Send + Sync + std::fmt::Debug + 'static;
 

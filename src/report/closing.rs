@@ -30,7 +30,8 @@ pub fn closing_table(plan: &Plan, findings: &Findings) -> StudyTable {
     let undecided = plan.variants.iter().zip(&findings.audits);
     let undecided = undecided.filter(|(_, audit)| audit.policy_preserved.is_none());
     notes.extend(
-        undecided.map(|(v, audit)| format!("{}: {}, {}", v.name, audit.verdict, audit.basis)),
+        undecided
+            .map(|(v, audit)| format!("{}: {}, {}", v.name, audit.verdict.as_str(), audit.basis)),
     );
     notes.extend(against_baseline(plan, &findings.summaries));
     StudyTable { rows: rows.collect(), notes }

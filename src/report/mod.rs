@@ -15,6 +15,8 @@
 //! - `runs`: a variant's units, gathered for tables and plots
 //! - `svg`: scales, ticks and escaping for hand-written SVG
 
+pub mod audit_json;
+pub mod audit_text;
 pub mod claims;
 pub mod closing;
 mod colours;

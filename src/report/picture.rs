@@ -159,10 +159,12 @@ pub fn pictures(
     let n_cells = tables.learned.first().map_or(0, |one| one.experienced.len());
     let learned: Vec<usize> =
         (0..n_cells).filter(|&c| tables.learned.iter().any(|one| one.experienced[c])).collect();
+    let own = variant.shaping.learned.unwrap_or(0.0);
+    let has_potential = has_potential(variant);
     for frame in frames(&landscape, variant, request, &learned)? {
         let cells = spots(&mut landscape, &frame)?;
         for &quantity in quantities {
-            if quantity == Quantity::Potential && variant.potential.is_none() {
+            if quantity == Quantity::Potential && !has_potential {
                 continue;
             }
             // A predictor was given its policy.
@@ -177,8 +179,11 @@ pub fn pictures(
             let of = |spot: &Spot| match *spot {
                 None => Place::Nothing,
                 Some((cell, phi)) => {
+                    let value = tables.value(cell);
+                    let phi =
+                        if own == 0.0 { phi } else { value.map(|v| phi.unwrap_or(0.0) + own * v) };
                     let known = match quantity {
-                        Quantity::Value => tables.value(cell).map(|v| v + phi.unwrap_or(0.0)),
+                        Quantity::Value => value.map(|v| v + phi.unwrap_or(0.0)),
                         Quantity::Policy => tables.action(cell).map(|a| a as f64),
                         Quantity::Potential => phi,
                     };
@@ -223,11 +228,16 @@ fn spots(landscape: &mut Landscape, frame: &Frame) -> Result<Vec<Spot>, StoredEr
     Ok(cells)
 }
 
+/// Whether there is a Φ of states.
+fn has_potential(variant: &Variant) -> bool {
+    variant.potential.is_some() || variant.shaping.shift != 0.0 || variant.shaping.learned.is_some()
+}
+
 fn label(variant: &Variant, quantity: Quantity) -> String {
     let of = if variant.changes_reward() { ", of the reward it learned from" } else { "" };
     let v = if variant.agent.is_predictor() { "V of the given policy" } else { "V = max Q" };
     match quantity {
-        Quantity::Value if variant.potential.is_some() => {
+        Quantity::Value if has_potential(variant) => {
             format!("{v} + Φ{of} (what was learned, the potential added back)")
         }
         Quantity::Value => format!("{v}{of}"),

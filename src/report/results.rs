@@ -392,6 +392,6 @@ fn summary_line(s: &VariantSummary, audit: &Audit) -> Vec<String> {
         maybe(s.threshold),
         s.solved.as_ref().map_or(String::new(), |x| x.seeds.to_string()),
         maybe(s.solved.as_ref().and_then(|x| x.median_episode)),
-        audit.verdict.to_string(),
+        audit.verdict.as_str().to_string(),
     ]
 }

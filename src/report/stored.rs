@@ -225,7 +225,7 @@ impl Stored {
                 runs.push(&self.load(unit)?);
             }
             findings.summaries.push(runs.summary(variant));
-            findings.audits.push(audit_variant(host, variant)?);
+            findings.audits.push(audit_variant(host, variant, None)?);
             findings.steps_per_second.push(rate(&times, present, i));
             let seeds = SeedList(own.iter().map(|u| u.seed).collect());
             plan.variants.push(Variant { seeds, ..variant.clone() });

@@ -119,14 +119,22 @@ impl Callbacks {
         }
     }
 
-    /// `callback` as a potential of the state's fields.
+    /// `callback` as a potential of the state's fields, and of the episode if it takes two
+    /// arguments.
     pub fn potential(self: &Rc<Self>, callback: &Callback, schema: &Schema) -> PhiFn {
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
-        Box::new(move |fields| {
+        Box::new(move |fields, episode| {
             let state = State::new(&schema, fields);
-            let arg = Dynamic::from(state.clone());
-            host.number(&callback, "the potential", [arg], &state).map_err(fault)
+            let s = Dynamic::from(state.clone());
+            let number = if callback.callback.arity == 1 {
+                host.number(&callback, "the potential", [s], &state)
+            } else {
+                let given = [s, Dynamic::from(i64::from(episode))];
+                host.number(&callback, "the potential", given, &state)
+                    .map_err(|d| d.note(format!("for episode {episode}")))
+            };
+            number.map_err(fault)
         })
     }
 

@@ -11,6 +11,7 @@ use super::keys;
 use super::params::{merge_agent, number, show, text, whole};
 use super::plan::GoldenBudget;
 use super::setting::{Entries, SettingDraft};
+use super::shaping::ShapingDraft;
 use super::value::MAX_DEPTH;
 use crate::learn::ParamValue;
 use crate::learn::registry::AgentSpec;
@@ -80,8 +81,7 @@ pub(super) struct ExperimentDraft {
     pub(super) threshold: Option<f64>,
     pub(super) window: Option<u32>,
     pub(super) setting: SettingDraft,
-    pub(super) potential: Option<Located<FnPtr>>,
-    pub(super) potential_raw: bool,
+    pub(super) shaping: ShapingDraft,
     pub(super) reward: Option<Located<FnPtr>>,
     pub(super) terms: BTreeMap<String, Located<FnPtr>>,
     pub(super) allowed: Option<Located<FnPtr>>,
@@ -104,7 +104,7 @@ pub(super) fn wrong(key: &str, expected: &str, value: &Dynamic) -> Diagnostic {
     Diagnostic::error(format!("`{key}` is {expected}, got {}", show(value)))
 }
 
-fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagnostic> {
+pub(super) fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagnostic> {
     value
         .clone()
         .flatten()
@@ -194,15 +194,6 @@ impl ExperimentDraft {
                 let finite = number(value).filter(|x| x.is_finite());
                 self.threshold = Some(finite.ok_or_else(|| wrong(key, "a finite number", value))?);
             }
-            "potential" if removed => self.potential = None,
-            "potential" => self.potential = Some(located(function(key, "(s) -> number", value)?)),
-            "potential_on" => {
-                self.potential_raw = match text(value).as_deref() {
-                    Some("cell") => false,
-                    Some("raw") => true,
-                    _ => return Err(wrong(key, "\"cell\" or \"raw\"", value)),
-                }
-            }
             "reward" if removed => self.reward = None,
             "reward" => self.reward = Some(located(function(key, "(t) -> number", value)?)),
             "allowed" if removed => self.allowed = None,
@@ -213,6 +204,7 @@ impl ExperimentDraft {
                 self.notes = Some(text(value).ok_or_else(|| wrong(key, "a string", value))?);
             }
             key if SettingDraft::knows(key) => self.setting.set(key, value, spot)?,
+            key if ShapingDraft::knows(key) => self.shaping.set(key, value, spot(key))?,
             unknown => {
                 return Err(Diagnostic::error(format!("an experiment has no key `{unknown}`"))
                     .maybe_hint(suggest(unknown, keys::names())));

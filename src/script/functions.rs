@@ -46,6 +46,11 @@ const BUILDERS: &[(&str, &str, &str)] = &[
         "uniform bins: NumPy's linspace and digitize, clamped; fields left out are ignored",
     ),
     ("cells", "cells(n, |s| i) or cells([n1, n2], |s| [i, j])", "scripted cells, numbered from 0"),
+    (
+        "learned",
+        "learned(eta)",
+        "a potential of eta times the learner's own state values, eta · max Q(s, a)",
+    ),
     ("constant", "constant(value)", "a schedule that does not change"),
     (
         "linear",

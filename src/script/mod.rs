@@ -25,6 +25,7 @@ mod record;
 mod resolve;
 mod sandbox;
 mod setting;
+mod shaping;
 mod source;
 mod state;
 mod syntax;
@@ -38,5 +39,6 @@ pub use host::{Host, load};
 pub use plan::{
     Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, Variant,
 };
+pub use shaping::{AdviceOn, Shaping};
 pub use source::{Source, SourceSet};
 pub use value::Value;

@@ -43,6 +43,7 @@ pub(super) fn show(value: &Dynamic) -> String {
         "EnvDraft" => "an environment".into(),
         "DiscretiserDraft" => "a discretiser".into(),
         "StudyDraft" => "a study".into(),
+        "LearnedPotential" => "a learned potential".into(),
         other => format!("a value of type {}", type_name(other)),
     }
 }

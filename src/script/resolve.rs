@@ -9,8 +9,8 @@ use rhai::FnPtr;
 use super::callback::Callbacks;
 use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
-use super::freeze::{ALLOWED, OF_STATE, OF_STEP};
-use super::plan::{Callback, DiscretiserSpec, Expectation, PhiOn, Plan, SeedList, Variant};
+use super::freeze::{ALLOWED, OF_STEP};
+use super::plan::{Callback, DiscretiserSpec, Expectation, Plan, SeedList, Variant};
 use super::value::Value;
 use super::world::{clipping_warning, dims, example_bins, physical_bins};
 use crate::env::{AnyEnv, EnvSpec};
@@ -119,38 +119,7 @@ impl Resolver<'_> {
                 warnings.push(warning);
             }
         }
-        let potential = self.optional(draft.potential.as_ref(), OF_STATE)?;
-        if potential.is_some()
-            && draft.potential_raw
-            && !matches!(discretiser, DiscretiserSpec::StateIndex)
-        {
-            let hint = match discretiser {
-                DiscretiserSpec::Bins(_) => {
-                    "leave out `potential_on: \"raw\"` to evaluate it on each cell's representative"
-                }
-                _ => "bins(..) have a representative to evaluate it on, scripted cells do not",
-            };
-            let warning = Diagnostic::warning(
-                "a potential of the raw state is not constant on the discretiser's cells",
-            )
-            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
-            .note("the greedy policy of the discretised problem may change")
-            .hint(hint);
-            // Variants that inherit their potential say it once.
-            if !warnings.contains(&warning) {
-                warnings.push(warning);
-            }
-        }
-        if potential.is_some()
-            && !draft.potential_raw
-            && matches!(discretiser, DiscretiserSpec::Cells { .. })
-        {
-            return Err(Diagnostic::error(
-                "scripted cells have no representative to evaluate the potential on",
-            )
-            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
-            .hint("use bins(..), or say `potential_on: \"raw\"`"));
-        }
+        let shaped = self.shaping(&draft.shaping, &agent.value, &discretiser, warnings)?;
         let allowed = self.allowed(draft, &any, spec)?;
         use_of_model(draft, &agent, spec, &any, &discretiser)?;
         let mut agent_functions = BTreeMap::new();
@@ -182,8 +151,9 @@ impl Resolver<'_> {
             max_steps: draft.max_steps.or(spec.max_steps).filter(|&n| n > 0),
             threshold: draft.threshold.or(spec.reward_threshold),
             window: draft.window.unwrap_or(WINDOW),
-            potential,
-            potential_on: if draft.potential_raw { PhiOn::Raw } else { PhiOn::Cell },
+            potential: shaped.potential,
+            potential_on: shaped.potential_on,
+            shaping: shaped.shaping,
             reward: self.optional(draft.reward.as_ref(), OF_STEP)?,
             terms,
             allowed,

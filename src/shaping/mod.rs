@@ -2,7 +2,8 @@
 //!
 //! - [`Discretiser`]: observation → what the agent sees. [`StateIndex`], [`Bins`],
 //!   [`ScriptedCells`], [`RawFields`]; [`Shield`]: the actions allowed there
-//! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`RawPotential`]
+//! - [`Features`]: the state's numbers → features, for linear values; [`Tiles`], [`Fourier`]
+//! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`EpisodePotential`], [`RawPotential`]
 //! - [`Scale`]: observation normalisation
 //! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
 //!   [`ScriptedReward`]
@@ -14,6 +15,7 @@
 
 mod bins;
 mod discretiser;
+mod features;
 mod potential;
 mod reward;
 mod scale;
@@ -24,9 +26,10 @@ pub use discretiser::{
     ActionSet, AnyCells, CellFn, Discretiser, Fields, RawFields, ScriptedCells, Seen, Shield,
     ShieldFn, Shielded, ShieldedCells, StateIndex,
 };
+pub use features::{Active, FeatureKind, FeatureSpec, Features, Fourier, MAX_WEIGHTS, Tiles};
 pub use potential::{
-    ActionFn, AnyPotential, CellPhiFn, CellPotential, NoPotential, PhiFn, Potential, RawPotential,
-    potential_term, shaped_model,
+    ActionFn, AnyPotential, CellEpisodeFn, CellPhiFn, CellPotential, EpisodePotential, NoPotential,
+    PhiFn, Potential, RawPotential, potential_term, shaped_model,
 };
 pub use reward::{
     AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,

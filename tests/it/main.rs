@@ -20,6 +20,7 @@ mod render;
 mod scripts;
 mod setting;
 mod shaping;
+mod shaping_figures;
 mod show;
 mod support;
 mod toy_text;

@@ -3,7 +3,7 @@
 use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, STEP_SIZE, UNIT};
 use super::{AgentSpec, AnyAgent, Build, Setup};
 use crate::learn::control::{
-    DoubleQLearning, DynaQ, ExpectedSarsa, NStepSarsa, QLambda, SarsaLambda, SoftQLearning,
+    Backup, DoubleQLearning, DynaQ, ExpectedSarsa, NStepSarsa, QLambda, SarsaLambda, SoftQLearning,
     Tabular, Trace, Traces,
 };
 use crate::learn::{
@@ -13,7 +13,7 @@ use crate::learn::{
 use crate::mdp::streams::Stream;
 
 /// With any behaviour and step size.
-fn table(c: &AgentConfig, mut setup: Setup) -> Tabular {
+pub(super) fn table(c: &AgentConfig, mut setup: Setup) -> Tabular {
     let behaviour = (c.exploration(), c.schedule("epsilon"));
     Tabular::new(setup.table(c), c.float("gamma"), c.alpha(), behaviour, setup.stream)
 }
@@ -68,34 +68,43 @@ pub(super) const Q_LEARNING: AgentSpec = AgentSpec {
     name: "q_learning",
     doc: "Q-learning (Watkins 1989; Sutton & Barto 6.5)",
     params: ONE_STEP,
-    build: Build::Learner(|c, mut setup| match schedules(c) {
-        Some((alpha, epsilon)) => {
-            let q = setup.table(c);
-            let agent = QLearning::new(q, c.float("gamma"), alpha, epsilon, setup.stream);
-            AnyAgent::QLearning(agent)
-        }
-        None => AnyAgent::tabular(QLearning::of(table(c, setup))),
-    }),
+    build: Build::OneStep {
+        backup: Backup::Best,
+        build: |c, mut setup| match schedules(c) {
+            Some((alpha, epsilon)) => {
+                let q = setup.table(c);
+                let agent = QLearning::new(q, c.float("gamma"), alpha, epsilon, setup.stream);
+                AnyAgent::QLearning(agent)
+            }
+            None => AnyAgent::tabular(QLearning::of(table(c, setup))),
+        },
+    },
 };
 
 pub(super) const SARSA: AgentSpec = AgentSpec {
     name: "sarsa",
     doc: "SARSA (Rummery & Niranjan 1994; Sutton & Barto 6.4)",
     params: ONE_STEP,
-    build: Build::Learner(|c, mut setup| match schedules(c) {
-        Some((alpha, epsilon)) => {
-            let q = setup.table(c);
-            AnyAgent::Sarsa(Sarsa::new(q, c.float("gamma"), alpha, epsilon, setup.stream))
-        }
-        None => AnyAgent::tabular(Sarsa::of(table(c, setup))),
-    }),
+    build: Build::OneStep {
+        backup: Backup::Played,
+        build: |c, mut setup| match schedules(c) {
+            Some((alpha, epsilon)) => {
+                let q = setup.table(c);
+                AnyAgent::Sarsa(Sarsa::new(q, c.float("gamma"), alpha, epsilon, setup.stream))
+            }
+            None => AnyAgent::tabular(Sarsa::of(table(c, setup))),
+        },
+    },
 };
 
 pub(super) const EXPECTED_SARSA: AgentSpec = AgentSpec {
     name: "expected_sarsa",
     doc: "expected SARSA (van Seijen et al. 2009; Sutton & Barto 6.6)",
     params: ONE_STEP,
-    build: Build::Learner(|c, setup| AnyAgent::tabular(ExpectedSarsa::new(table(c, setup)))),
+    build: Build::OneStep {
+        backup: Backup::Expected,
+        build: |c, setup| AnyAgent::tabular(ExpectedSarsa::new(table(c, setup))),
+    },
 };
 
 pub(super) const DOUBLE_Q_LEARNING: AgentSpec = AgentSpec {
@@ -125,7 +134,7 @@ pub(super) const N_STEP_SARSA: AgentSpec = AgentSpec {
         EXPLORATION,
         INITIAL_Q,
     ],
-    build: Build::Learner(|c, setup| {
+    build: Build::OnPolicy(|c, setup| {
         AnyAgent::tabular(NStepSarsa::new(table(c, setup), c.int("n") as usize))
     }),
 };
@@ -134,7 +143,7 @@ pub(super) const SARSA_LAMBDA: AgentSpec = AgentSpec {
     name: "sarsa_lambda",
     doc: "SARSA(λ) with eligibility traces (Rummery 1995; Sutton & Barto 12.7)",
     params: WITH_TRACES,
-    build: Build::Learner(|c, setup| {
+    build: Build::OnPolicy(|c, setup| {
         let traces = traces(c, setup.n_states * setup.n_actions);
         AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
     }),

@@ -9,6 +9,7 @@ mod planners;
 mod prediction;
 mod shared;
 
+use super::control::{Advised, Backup};
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
 use super::prediction::GivenPolicy;
@@ -54,13 +55,25 @@ impl Setup {
     }
 }
 
+/// Makes a learner.
+pub type BuildFn = fn(&AgentConfig, Setup) -> AnyAgent;
+
 /// How an agent comes to be.
 #[derive(Debug, Clone, Copy)]
 pub enum Build {
     /// A learner.
-    Learner(fn(&AgentConfig, Setup) -> AnyAgent),
+    Learner(BuildFn),
     /// A learner of the state values of a policy that is given.
-    Predictor(fn(&AgentConfig, Setup) -> AnyAgent),
+    Predictor(BuildFn),
+    /// A learner of the values of the policy that it plays.
+    OnPolicy(BuildFn),
+    /// A learner of action values with one-step targets.
+    OneStep {
+        /// How it is built.
+        build: BuildFn,
+        /// What its target bootstraps from.
+        backup: Backup,
+    },
     /// A planner, which needs the environment's finite model.
     Planner(fn(&AgentConfig) -> Box<dyn Planner>),
 }
@@ -76,6 +89,30 @@ pub struct AgentSpec {
     pub params: &'static [ParamSpec],
     /// How it is built.
     pub build: Build,
+}
+
+impl AgentSpec {
+    /// Whether it takes look-ahead advice, and can be shaped by its own values.
+    pub fn is_one_step(&self) -> bool {
+        matches!(self.build, Build::OneStep { .. })
+    }
+
+    /// Whether it takes look-back advice: it learns the values of the policy it plays.
+    pub fn is_on_policy(&self) -> bool {
+        match self.build {
+            Build::OnPolicy(_) => true,
+            Build::OneStep { backup, .. } => backup != Backup::Best,
+            Build::Learner(_) | Build::Predictor(_) | Build::Planner(_) => false,
+        }
+    }
+
+    /// The agent as it is with look-ahead advice `phi`, shape `[n_states, n_actions]`; `None` if it
+    /// takes none.
+    pub fn advised(&self, config: &AgentConfig, setup: Setup, phi: QTable) -> Option<AnyAgent> {
+        let Build::OneStep { backup, .. } = self.build else { return None };
+        let table = control::table(config, setup);
+        Some(AnyAgent::tabular(Advised::new(backup, table, phi)))
+    }
 }
 
 /// Any agent whose states are the rows of a table, with a shield or without.
