@@ -22,6 +22,7 @@ mod setting;
 mod shaping;
 mod shaping_figures;
 mod show;
+mod solved;
 mod support;
 mod toy_text;
 mod unreadable;

@@ -19,7 +19,7 @@ mod solution;
 mod value_iteration;
 
 pub use components::Components;
-pub use dynamics::{Dynamics, Over};
+pub use dynamics::{Dynamics, Over, Sources};
 pub use error::PlanError;
 pub use evaluation::{Policy, PolicyValue, policy_value};
 pub use planned_agent::PlannedAgent;
