@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use runner::env::blackjack::{Blackjack, Rules};
 use runner::experiment::{Limits, World, train};
 use runner::learn::control::{Trace, Traces};
-use runner::learn::planning::{Planner, ValueIteration, policy_value};
+use runner::learn::planning::{Over, Planner, Policy, ValueIteration, policy_value};
 use runner::learn::prediction::{
     Estimate, GivenPolicy, MonteCarloPrediction, NStepTd, Prediction, Rule, Td0, TdLambda,
 };
@@ -42,6 +42,11 @@ impl RandomWalk {
 
     fn n_states(&self) -> usize {
         self.0.mdp().n_states()
+    }
+
+    /// The exact values.
+    fn values(&self) -> Vec<f64> {
+        policy_value(self.0.mdp(), 1.0, Policy::Uniform, Over::Every).unwrap().v
     }
 }
 
@@ -106,7 +111,7 @@ fn errors<R: Rule>(
     rule: impl Fn() -> R,
 ) -> Vec<f64> {
     let n = walk.n_states();
-    let exact = policy_value(walk.0.mdp(), 1.0, &vec![0; n]).unwrap();
+    let exact = walk.values();
     let mut means = vec![0.0; episodes as usize];
     for run in 0..runs {
         let estimate = Estimate::new(vec![initial; n], 1.0, constant(alpha));
@@ -130,10 +135,10 @@ fn mean(values: &[f64]) -> f64 {
 #[test]
 fn the_walks_have_the_books_values() {
     let five = RandomWalk::new(5, 0.0);
-    let v = policy_value(five.0.mdp(), 1.0, &[0; 5]).unwrap();
+    let v = five.values();
     assert!(v.iter().zip(1..).all(|(v, i)| (v - f64::from(i) / 6.0).abs() < 1e-12), "{v:?}");
     let nineteen = RandomWalk::new(19, -1.0);
-    let v = policy_value(nineteen.0.mdp(), 1.0, &[0; 19]).unwrap();
+    let v = nineteen.values();
     assert!(v.iter().zip(-9..).all(|(v, i)| (v - f64::from(i) / 10.0).abs() < 1e-12), "{v:?}");
 }
 
@@ -208,7 +213,7 @@ fn hand(sum: usize, dealer: usize, ace: bool) -> usize {
 /// Optimal action values.
 fn optimal(mdp: &FiniteMdp) -> QTable {
     let planner = ValueIteration { gamma: 1.0, theta: 0.0, max_sweeps: 100 };
-    planner.solve(mdp, &vec![0.0; mdp.n_states()]).q
+    planner.solve(mdp, &vec![0.0; mdp.n_states()]).unwrap().q
 }
 
 const SAMPLE_AVERAGE: AlphaSource = AlphaSource::VisitCount { omega: 1.0 };
@@ -235,10 +240,10 @@ fn figure_5_2_blackjack_is_solved_with_exploring_starts() {
             }
         }
     }
-    // Of 200 states. Where they disagree, the two actions are worth nearly the same.
-    println!("{wrong:?}");
-    assert!(wrong.len() <= 4, "{wrong:?}");
-    assert!(wrong.iter().all(|w| w.3.abs() < 0.02), "{wrong:?}");
+    // Of 200 states, with and without a usable ace. Where two actions are worth nearly the same,
+    // even five million episodes may not tell.
+    assert!(wrong.len() <= 2, "{wrong:?}");
+    assert!(wrong.iter().all(|w| w.3.abs() < 0.01), "{wrong:?}");
 }
 
 /// Blackjack from one state.
@@ -291,7 +296,7 @@ fn figure_5_3_the_value_of_a_blackjack_state() {
     let policy: Vec<Action> = (0..mdp.n_states())
         .map(|s| usize::from(env.state(s).is_none_or(|obs| obs.player < 20)))
         .collect();
-    let v = policy_value(&mdp, 1.0, &policy).unwrap();
+    let v = policy_value(&mdp, 1.0, Policy::Deterministic(&policy), Over::Reachable).unwrap().v;
     // The book's value, from a hundred million episodes.
     assert!((v[s] + 0.27726).abs() < 2e-4, "{}", v[s]);
     // From twenty thousand: the standard error is 0.007.
@@ -327,7 +332,6 @@ fn figure_5_3_weighted_importance_sampling_has_a_low_error() {
             }
         });
     }
-    println!("{squares:?}");
     // The figure's mean square error falls to about 0.2 after 100 episodes and below 0.01 after
     // 10,000.
     assert!(squares[2] < 0.01 && squares[2] < squares[1] && squares[1] < squares[0], "{squares:?}");

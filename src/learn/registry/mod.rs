@@ -188,6 +188,7 @@ pub static AGENTS: &[AgentSpec] = &[
     control::DYNA_Q,
     control::SOFT_Q_LEARNING,
     planners::VALUE_ITERATION,
+    planners::POLICY_ITERATION,
     planners::RANDOM_AGENT,
 ];
 
