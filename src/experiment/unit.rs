@@ -23,7 +23,7 @@ use crate::shaping::{
 
 /// Raised whenever the same configuration gives other results than before: old units are then not
 /// taken for new ones.
-pub const SEMANTICS: u32 = 1;
+pub const SEMANTICS: u32 = 2;
 
 /// Whether the commonest combinations get loops of their own. Not when debugging: they are most of
 /// what there is to compile, and the shared loop gives the same results.

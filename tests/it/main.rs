@@ -21,6 +21,7 @@ mod scripts;
 mod setting;
 mod shaping;
 mod shaping_figures;
+mod shield;
 mod show;
 mod solved;
 mod support;
