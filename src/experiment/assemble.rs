@@ -4,7 +4,7 @@ use super::predict::{Exact, given_policy};
 use super::shaped::{learner, potential};
 use super::shielded::playable;
 use crate::learn::AnyAgent;
-use crate::learn::planning::PlannedAgent;
+use crate::learn::planning::{PlannedAgent, Sweep};
 use crate::learn::registry::{Build, Setup};
 use crate::mdp::streams::Stream;
 use crate::mdp::{Env, FiniteMdp, Schema};
@@ -288,8 +288,8 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
 /// An agent, and what is known about what it does.
 pub(super) struct Assembled {
     pub(super) agent: AnyAgent,
-    /// A planner's largest change per sweep; empty for learners.
-    pub(super) sweeps: Vec<f64>,
+    /// How a planner came to its solution; empty for learners.
+    pub(super) sweeps: Vec<Sweep>,
     /// What a predictor should learn, where there is a model.
     pub(super) exact: Option<Exact>,
 }
@@ -334,7 +334,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let model = learned_model(host, variant, env)?;
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
             let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
-            let sweeps = solution.changes.clone();
+            let sweeps = solution.sweeps(planner.gamma());
             let agent = AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma()));
             Ok(Assembled { agent, sweeps, exact: None })
         }

@@ -1,6 +1,7 @@
 //! What a unit leaves behind.
 
 use crate::learn::QTable;
+use crate::learn::planning::Sweep;
 use crate::mdp::Ending;
 
 /// One episode.
@@ -35,8 +36,8 @@ pub struct UnitRecord {
     pub q: Option<QTable>,
     /// The state values learned, if they are what the agent learns.
     pub values: Option<StateValues>,
-    /// A planner's largest change per sweep; empty for learners.
-    pub sweeps: Vec<f64>,
+    /// How a planner came to its solution; empty for learners.
+    pub sweeps: Vec<Sweep>,
 }
 
 /// State values with what they should be.

@@ -10,6 +10,7 @@ use super::record::{EpisodeRow, StateValues, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
 use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
+use crate::learn::planning::Sweep;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
 use crate::learn::{AnyAgent, Learn};
 use crate::mdp::Env;
@@ -170,7 +171,7 @@ struct Parts<E: Env> {
 
 /// What a unit knows about its agent beyond what it learns.
 struct Extra {
-    sweeps: Vec<f64>,
+    sweeps: Vec<Sweep>,
     exact: Option<Exact>,
 }
 

@@ -1,6 +1,7 @@
 //! Integration tests: one binary, one module a subject.
 
 mod blackjack;
+mod book_figures;
 mod cli;
 mod crash;
 mod env;
@@ -12,6 +13,7 @@ mod numbers;
 mod parity;
 mod placing;
 mod play;
+mod prediction;
 mod readme;
 mod refusals;
 mod render;

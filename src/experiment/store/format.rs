@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use crate::experiment::hex;
 use crate::experiment::record::{EpisodeRow, StateValues, UnitRecord};
+use crate::learn::planning::Sweep;
 use crate::learn::{ParamValue, QTable, argmax_tol};
 use crate::mdp::Ending;
 use crate::script::{DiscretiserSpec, Variant};
@@ -240,10 +241,14 @@ pub(super) fn read_values(bytes: &[u8], n_states: usize) -> Result<Vec<StoredVal
     Ok(values)
 }
 
-pub(super) fn sweeps(changes: &[f64]) -> Vec<u8> {
-    let mut text = String::from("sweep,largest_change\n");
-    for (i, change) in changes.iter().enumerate() {
-        writeln!(text, "{},{}", i + 1, float(*change)).expect(NEVER);
+/// `sweep,largest_change,error_bound,switched`: how a planner came to its solution; empty what is not
+/// known.
+pub(super) fn sweeps(sweeps: &[Sweep]) -> Vec<u8> {
+    let mut text = String::from("sweep,largest_change,error_bound,switched\n");
+    for (i, Sweep { change, bound, switched }) in sweeps.iter().enumerate() {
+        let bound = bound.map_or_else(String::new, float);
+        let switched = switched.map_or_else(String::new, |n| n.to_string());
+        writeln!(text, "{},{},{bound},{switched}", i + 1, float(*change)).expect(NEVER);
     }
     text.into_bytes()
 }

@@ -1,12 +1,9 @@
 //! Agents that learn action values from the returns of whole episodes.
 
-use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, STEP_SIZE, VISITS};
+use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, MEAN, VISITS};
 use super::{AgentSpec, AnyAgent, Build};
 use crate::learn::{MonteCarlo, OffPolicyMonteCarlo, ParamKind, ParamSpec, ParamValue, Visits};
 use crate::mdp::streams::Stream;
-
-/// The mean of the returns.
-const MEAN: ParamSpec = ParamSpec { default: ParamValue::VisitCount { omega: 1.0 }, ..STEP_SIZE };
 
 /// The switch that makes episodes start anywhere.
 const EXPLORING_STARTS: ParamSpec = ParamSpec {
