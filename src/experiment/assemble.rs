@@ -262,7 +262,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
     seed: u64,
 ) -> Result<(AnyAgent, Vec<f64>), Fault> {
     match variant.agent.spec.build {
-        Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. } => {
+        Build::Learner(build) | Build::OnPolicy { build, .. } | Build::OneStep { build, .. } => {
             let initial_q = match variant.agent_functions.get("initial_q") {
                 Some(f) => {
                     Some(of_action(host, variant, env, n_cells, f, "the initial action value")?)

@@ -22,4 +22,5 @@ mod show;
 mod support;
 mod toy_text;
 mod unreadable;
+mod variants;
 mod wiewiora;
