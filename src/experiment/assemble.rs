@@ -305,7 +305,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
     match variant.agent.spec.build {
         Build::Learner(build)
         | Build::Predictor(build)
-        | Build::OnPolicy(build)
+        | Build::OnPolicy { build, .. }
         | Build::OneStep { build, .. } => {
             let function = |name: &str| variant.agent_functions.get(name);
             let initial_q = function("initial_q")

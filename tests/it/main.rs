@@ -27,4 +27,5 @@ mod solved;
 mod support;
 mod toy_text;
 mod unreadable;
+mod variants;
 mod wiewiora;

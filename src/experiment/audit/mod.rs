@@ -208,11 +208,12 @@ impl EnvVisitor for Judge<'_> {
 
 /// What a learner knows of advice on the step before is gone when it bootstraps.
 fn look_back(variant: &Variant) -> Audit {
-    let basis = if variant.agent.spec.is_one_step() {
-        "look-back advice: a learner that bootstraps does not take all of it back"
-    } else {
-        "look-back advice is taken back over whole returns only"
-    };
+    if variant.agent.spec.learns_from_returns() && !variant.changes_reward() {
+        let basis = "by construction: a return takes back the advice on the step before it, and \
+                     no more";
+        return Audit::new(AuditVerdict::PotentialBased, Some(true), basis);
+    }
+    let basis = "look-back advice: a learner that bootstraps does not take all of it back";
     Audit::new(AuditVerdict::Inconclusive, None, basis)
 }
 
