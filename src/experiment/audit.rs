@@ -61,7 +61,8 @@ impl Audit {
 /// Judges the shaping of `variant`.
 ///
 /// On a finite environment both models are solved and compared. Elsewhere a potential evaluated on
-/// cells is potential-based by construction, and other rewards are not judged.
+/// cells, or on the states themselves where values are linear in features, is potential-based by
+/// construction, and other rewards are not judged.
 ///
 /// # Errors
 /// If a callback fails.
@@ -84,7 +85,10 @@ impl EnvVisitor for Judge<'_> {
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let (host, variant) = (self.host, self.variant);
         let potential_only = !variant.changes_reward();
-        let DiscretiserSpec::StateIndex = variant.discretiser else {
+        // Features know nothing of cells either: what is said is said of the states themselves.
+        let on_cells =
+            matches!(variant.discretiser, DiscretiserSpec::Bins(_) | DiscretiserSpec::Cells { .. });
+        if on_cells {
             return Ok(match (potential_only, variant.potential_on) {
                 (true, PhiOn::Cell) => Audit::new(
                     "potential-based",
@@ -98,7 +102,7 @@ impl EnvVisitor for Judge<'_> {
                     Audit::new("not checked", None, "a changed reward without a finite model")
                 }
             });
-        };
+        }
         let Some(plain) = env.finite().filter(|_| variant.frame_skip == 1) else {
             return Ok(match (potential_only, variant.frame_skip) {
                 (true, _) => Audit::new(

@@ -36,7 +36,8 @@ pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use landscape::{Landscape, ListedState};
 pub use record::{EpisodeRow, Learned, UnitRecord};
 pub use store::{
-    Store, StoreError, StoredUnit, read_table, write_atomically, write_atomically_with,
+    Store, StoreError, StoredUnit, holds_weights, read_table, read_weights, write_atomically,
+    write_atomically_with,
 };
 pub use train::{Limits, TrainError, World, train};
 pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};

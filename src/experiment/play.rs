@@ -6,18 +6,17 @@
 //! action is played, which is what greedy choice did in training too. An action is repeated for as
 //! many steps as the variant's `frame_skip` says.
 
-use super::landscape::Locate;
+use super::landscape::{Locate, Values};
 use crate::env::rollout::{Event, Length, RolloutError, drive};
 use crate::env::{EnvError, PlayedAction, Session};
-use crate::learn::{QTable, argmax_tol};
+use crate::learn::{LinearQ, QTable, argmax_tol};
 use crate::mdp::numpy::Seed;
 use crate::mdp::{Action, Ending};
 use crate::script::{Host, Variant};
 
-/// A greedy policy over a table.
+/// A greedy policy.
 pub struct Policy {
-    locate: Locate,
-    q: QTable,
+    values: Values,
     /// For how many steps an action is played.
     frame_skip: u32,
     /// The action that is played now.
@@ -25,15 +24,21 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// The policy of `variant` that is greedy with respect to `q`, a table of its units.
+    /// The policy of `variant` that is greedy with respect to `q`, the table (or the weights) of
+    /// one of its units.
     pub fn new(host: &Host, variant: &Variant, session: &Session, q: QTable) -> Self {
-        let locate = Locate::new(host, variant, session.schema());
-        Self { locate, q, frame_skip: variant.frame_skip, held: 0 }
+        let values = Values::new(host, variant, session.schema(), q);
+        Self { values, frame_skip: variant.frame_skip, held: 0 }
     }
 
     /// The policy of a table that has one row per state of a finite environment.
     pub fn of_states(q: QTable) -> Self {
-        Self { locate: Locate::Index, q, frame_skip: 1, held: 0 }
+        Self { values: Values::Table(Locate::Index, q), frame_skip: 1, held: 0 }
+    }
+
+    /// The policy of values that are linear in features; an action is played for `frame_skip` steps.
+    pub fn of_weights(q: LinearQ, frame_skip: u32) -> Self {
+        Self { values: Values::linear(q), frame_skip, held: 0 }
     }
 
     /// The action for the session's present state.
@@ -42,8 +47,8 @@ impl Policy {
     /// If a scripted discretiser fails.
     pub fn action(&mut self, session: &Session) -> Result<PlayedAction, RolloutError> {
         if session.elapsed().is_multiple_of(self.frame_skip) {
-            let cell = self.locate.present(session).map_err(|f| RolloutError::Policy(f.0))?;
-            self.held = argmax_tol(self.q.row(cell));
+            let row = self.values.present(session).map_err(|f| RolloutError::Policy(f.0))?;
+            self.held = argmax_tol(row);
         }
         Ok(session.action(self.held))
     }

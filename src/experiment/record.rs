@@ -1,7 +1,8 @@
 //! What a unit leaves behind.
 
-use crate::learn::QTable;
+use crate::learn::{LinearQ, QTable};
 use crate::mdp::Ending;
+use crate::shaping::Features;
 
 /// One episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,17 +30,36 @@ pub struct UnitRecord {
     pub rows: Vec<EpisodeRow>,
     /// The action values learned, if the agent keeps any.
     pub q: Option<QTable>,
+    /// The weights learned, shape `[n_features, n_actions]`, if the agent's values are linear in
+    /// features.
+    pub weights: Option<QTable>,
     /// A planner's largest change per sweep; empty for learners.
     pub sweeps: Vec<f64>,
 }
 
-/// Action values read back from a store.
+/// Action values read back from a store: a row per state, or where values are linear in features a
+/// row of weights per feature.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
-    /// The values; the agent's initial one where nothing was learned.
+    /// The rows; the agent's initial ones where nothing was learned.
     pub q: QTable,
-    /// Whether anything was learned in a state, one flag each.
+    /// Whether anything was learned, one flag per row.
     pub experienced: Vec<bool>,
+}
+
+impl Learned {
+    /// Of weights of `features`: the values at `states`, a row each. Something was learned where it
+    /// was of one of the state's features.
+    pub fn at(self, features: &Features, states: &[Vec<f64>]) -> Self {
+        let mut active = features.active();
+        let mut known = |state: &Vec<f64>| {
+            features.see(state, &mut active);
+            active.index.iter().any(|&i| self.experienced[i as usize])
+        };
+        let experienced = states.iter().map(&mut known).collect();
+        let q = LinearQ::from_weights(features.clone(), self.q).table(states);
+        Self { q, experienced }
+    }
 }
 
 impl UnitRecord {

@@ -2,6 +2,7 @@
 //!
 //! - [`Agent`], [`Learn`]: chooses actions and learns from rewards; [`QLearning`], [`Sarsa`],
 //!   [`RandomAgent`]
+//! - [`linear`]: agents whose action values are linear in features
 //! - [`planning`]: value iteration, exact policy evaluation, Q from V on a [`FiniteMdp`]
 //! - [`registry`]: the one place where an agent is registered; [`AgentConfig`] is its configuration
 //! - [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what they are made of
@@ -13,6 +14,7 @@
 
 mod agent;
 mod greedy;
+pub mod linear;
 mod params;
 pub mod planning;
 mod q_learning;
@@ -27,6 +29,7 @@ pub use agent::{Agent, Last, Learn, Seen};
 pub use greedy::{
     Behaviour, argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed,
 };
+pub use linear::{LinearLearner, LinearQ, LinearSetup};
 pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
 pub use q_learning::QLearning;
 pub use q_table::QTable;

@@ -8,7 +8,7 @@ use super::stored::StoredError;
 use crate::experiment::{Landscape, ListedState};
 use crate::mdp::{Field, FieldKind};
 use crate::script::{DiscretiserSpec, Variant, suggest};
-use crate::shaping::Bins;
+use crate::shaping::{Bins, FeatureSpec};
 
 /// Places along an axis whose field is not cut into bins.
 const UNBINNED: usize = 60;
@@ -212,7 +212,10 @@ fn acting(states: &[ListedState]) -> Vec<&ListedState> {
 fn telling(landscape: &Landscape, variant: &Variant) -> Vec<usize> {
     let fields = &landscape.schema.fields;
     let states = match (&variant.discretiser, &landscape.states) {
-        (DiscretiserSpec::Bins(dims), _) => return dims.iter().map(|d| d.field).collect(),
+        (DiscretiserSpec::Bins(dims), _)
+        | (DiscretiserSpec::Features(FeatureSpec { dims, .. }), _) => {
+            return dims.iter().map(|d| d.field).collect();
+        }
         (_, Some(states)) => states,
         _ => return (0..fields.len()).collect(),
     };
@@ -344,9 +347,9 @@ impl Choice<'_> {
     /// Where fields stand that nobody chose: in the middle of their bins, or of their range.
     fn middle(&self) -> Vec<f64> {
         let mut fields = self.landscape.middle();
-        if let DiscretiserSpec::Bins(dims) = &self.variant.discretiser {
-            for d in dims {
-                fields[d.field] = f64::midpoint(d.lo, d.hi);
+        for (f, value) in fields.iter_mut().enumerate() {
+            if let Some([low, high]) = self.variant.discretiser.range(f) {
+                *value = f64::midpoint(low, high);
             }
         }
         fields
@@ -391,8 +394,9 @@ impl Choice<'_> {
         // A map is drawn whole; elsewhere what no episode meets is left out.
         let own = self.values(field);
         let is_map = self.landscape.schema.grid.is_some();
-        let (low, high) = match (own.first(), own.last()) {
-            (Some(&low), Some(&high)) if !is_map => (low, high),
+        let (low, high) = match (own.first(), own.last(), self.variant.discretiser.range(field)) {
+            (Some(&low), Some(&high), _) if !is_map => (low, high),
+            (_, _, Some([low, high])) if kind == FieldKind::Float => (low, high),
             _ => (low, high),
         };
         if !(low.is_finite() && high.is_finite()) || kind == FieldKind::Letter {

@@ -23,14 +23,14 @@ use crate::shaping::MAX_CELLS;
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
 
 /// A call in progress: finds the places of the call, its arguments and their keys.
-struct Call<'a> {
+pub(super) struct Call<'a> {
     context: &'a Context,
     source: Option<String>,
     position: rhai::Position,
 }
 
 impl<'a> Call<'a> {
-    fn new(context: &'a Context, native: &NativeCallContext) -> Self {
+    pub(super) fn new(context: &'a Context, native: &NativeCallContext) -> Self {
         Self {
             context,
             source: native.call_source().map(str::to_string),
@@ -61,12 +61,12 @@ impl<'a> Call<'a> {
     }
 
     /// The place of a (dotted) key in a map literal of this call; else the call's own.
-    fn key(&self, key: &str) -> Spot {
+    pub(super) fn key(&self, key: &str) -> Spot {
         self.found(|syntax, call| syntax.keys.get(&call)?.get(key).copied())
     }
 
     /// The place of the `i`-th argument; else the call's own.
-    fn arg(&self, i: usize) -> Spot {
+    pub(super) fn arg(&self, i: usize) -> Spot {
         self.found(|syntax, call| {
             syntax.args.get(&call)?.get(i).copied().filter(|at| *at != (0, 0))
         })
@@ -77,7 +77,7 @@ impl<'a> Call<'a> {
         Err(Box::new(EvalAltResult::ErrorRuntime(Dynamic::from(diagnostic), self.position)))
     }
 
-    fn finish<T>(&self, result: Result<T, Diagnostic>) -> Fallible<T> {
+    pub(super) fn finish<T>(&self, result: Result<T, Diagnostic>) -> Fallible<T> {
         result.or_else(|diagnostic| self.fail(diagnostic))
     }
 }
@@ -98,6 +98,7 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     }
     schedules(engine, context);
     discretisers(engine, context);
+    super::features::register(engine, context);
 }
 
 fn experiments(engine: &mut Engine, context: &Rc<Context>) {

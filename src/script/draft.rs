@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 use rhai::{Dynamic, FnPtr, Map};
 
 use super::diagnostic::{Diagnostic, Place, suggest};
+use super::features::FeaturesDraft;
 use super::keys;
 use super::params::{merge_agent, number, show, text, whole};
-use super::plan::GoldenBudget;
+use super::plan::{GoldenBudget, PhiOn};
 use super::setting::{Entries, SettingDraft};
 use super::value::MAX_DEPTH;
 use crate::learn::ParamValue;
@@ -59,11 +60,23 @@ pub(super) struct BinDraft {
     pub(super) spot: Spot,
 }
 
-/// `bins(…)` or `cells(…)`.
+/// `bins(…)`, `cells(…)`, `tiles(…)` or `fourier(…)`.
 #[derive(Debug, Clone)]
 pub(super) enum DiscretiserDraft {
     Bins(Vec<BinDraft>),
     Cells { shape: Vec<usize>, cell: FnPtr },
+    Features(FeaturesDraft),
+}
+
+impl DiscretiserDraft {
+    /// The fields that are cut up, with their ranges.
+    pub(super) fn ranges(&self) -> &[BinDraft] {
+        match self {
+            Self::Bins(bins) => bins,
+            Self::Features(features) => &features.ranges,
+            Self::Cells { .. } => &[],
+        }
+    }
 }
 
 /// `experiment(#{ … })`.
@@ -81,7 +94,7 @@ pub(super) struct ExperimentDraft {
     pub(super) window: Option<u32>,
     pub(super) setting: SettingDraft,
     pub(super) potential: Option<Located<FnPtr>>,
-    pub(super) potential_raw: bool,
+    pub(super) potential_on: Option<Located<PhiOn>>,
     pub(super) reward: Option<Located<FnPtr>>,
     pub(super) terms: BTreeMap<String, Located<FnPtr>>,
     pub(super) allowed: Option<Located<FnPtr>>,
@@ -178,7 +191,9 @@ impl ExperimentDraft {
             "discretiser" if removed => self.discretiser = None,
             "discretiser" => {
                 let draft = value.clone().flatten().try_cast::<DiscretiserDraft>();
-                let value = draft.ok_or_else(|| wrong(key, "bins(..) or cells(..)", value))?;
+                let value = draft.ok_or_else(|| {
+                    wrong(key, "bins(..), cells(..), tiles(..) or fourier(..)", value)
+                })?;
                 self.discretiser = Some(Located { value, spot: spot(key) });
             }
             "episodes" => {
@@ -197,11 +212,12 @@ impl ExperimentDraft {
             "potential" if removed => self.potential = None,
             "potential" => self.potential = Some(located(function(key, "(s) -> number", value)?)),
             "potential_on" => {
-                self.potential_raw = match text(value).as_deref() {
-                    Some("cell") => false,
-                    Some("raw") => true,
+                let on = match text(value).as_deref() {
+                    Some("cell") => PhiOn::Cell,
+                    Some("raw") => PhiOn::Raw,
                     _ => return Err(wrong(key, "\"cell\" or \"raw\"", value)),
-                }
+                };
+                self.potential_on = Some(Located { value: on, spot: spot(key) });
             }
             "reward" if removed => self.reward = None,
             "reward" => self.reward = Some(located(function(key, "(t) -> number", value)?)),

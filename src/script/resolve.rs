@@ -9,6 +9,7 @@ use rhai::FnPtr;
 use super::callback::Callbacks;
 use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
+use super::features::{self, Surroundings};
 use super::freeze::{ALLOWED, OF_STATE, OF_STEP};
 use super::plan::{Callback, DiscretiserSpec, Expectation, PhiOn, Plan, SeedList, Variant};
 use super::value::Value;
@@ -111,7 +112,7 @@ impl Resolver<'_> {
             Some(n) => n.value.scales(&schema, spec, &n.spot)?,
             None => Vec::new(),
         };
-        let discretiser = self.discretiser(draft, &agent, spec, &any, &normalise)?;
+        let discretiser = self.discretiser(draft, &agent, spec, &any, &normalise, warnings)?;
         warnings.extend(physical_bins(draft, &schema, &normalise));
         if let Some(clip) = &setting.clip_reward {
             let warning = clipping_warning(clip);
@@ -120,9 +121,10 @@ impl Resolver<'_> {
             }
         }
         let potential = self.optional(draft.potential.as_ref(), OF_STATE)?;
+        let potential_on = potential_on(draft, &discretiser)?;
         if potential.is_some()
-            && draft.potential_raw
-            && !matches!(discretiser, DiscretiserSpec::StateIndex)
+            && potential_on == PhiOn::Raw
+            && matches!(discretiser, DiscretiserSpec::Bins(_) | DiscretiserSpec::Cells { .. })
         {
             let hint = match discretiser {
                 DiscretiserSpec::Bins(_) => {
@@ -142,7 +144,7 @@ impl Resolver<'_> {
             }
         }
         if potential.is_some()
-            && !draft.potential_raw
+            && potential_on == PhiOn::Cell
             && matches!(discretiser, DiscretiserSpec::Cells { .. })
         {
             return Err(Diagnostic::error(
@@ -182,7 +184,7 @@ impl Resolver<'_> {
             threshold: draft.threshold.or(spec.reward_threshold),
             window: draft.window.unwrap_or(WINDOW),
             potential,
-            potential_on: if draft.potential_raw { PhiOn::Raw } else { PhiOn::Cell },
+            potential_on,
             reward: self.optional(draft.reward.as_ref(), OF_STEP)?,
             terms,
             allowed,
@@ -220,9 +222,14 @@ impl Resolver<'_> {
     ) -> Result<Callback, Diagnostic> {
         let param = agent.value.spec.params.iter().find(|p| p.name == name);
         let signature = param.and_then(|p| p.function).expect("checked when it was merged");
-        if matches!(discretiser, DiscretiserSpec::Cells { .. }) {
+        let without = match discretiser {
+            DiscretiserSpec::Cells { .. } => "scripted cells",
+            DiscretiserSpec::Features(_) => "features",
+            DiscretiserSpec::StateIndex | DiscretiserSpec::Bins(_) => "",
+        };
+        if !without.is_empty() {
             return Err(Diagnostic::error(format!(
-                "scripted cells have no representative to evaluate `{name}` on"
+                "{without} have no representative to evaluate `{name}` on"
             ))
             .at(f.spot.place())
             .hint("use bins(..), or give a number"));
@@ -234,9 +241,10 @@ impl Resolver<'_> {
         &self,
         draft: &ExperimentDraft,
         agent: &Located<AgentConfig>,
-        spec: &EnvSpec,
+        spec: &'static EnvSpec,
         env: &AnyEnv,
         normalise: &[Scale],
+        warnings: &mut Vec<Diagnostic>,
     ) -> Result<DiscretiserSpec, Diagnostic> {
         let has_model = env.finite().is_some();
         if agent.value.is_planner() && draft.setting.frame_skip.is_some_and(|n| n > 1) {
@@ -279,6 +287,13 @@ impl Resolver<'_> {
                 DiscretiserDraft::Bins(bins) => dims(bins, &env.schema(), normalise, spec)
                     .map(DiscretiserSpec::Bins)
                     .map_err(|e| e.at(d.spot.place())),
+                DiscretiserDraft::Features(features) => {
+                    let schema = &env.schema();
+                    let at = Surroundings { spec, schema, normalise, agent };
+                    features::resolve(features, &d.spot, &at, warnings)
+                        .map(DiscretiserSpec::Features)
+                        .map_err(|e| e.at(d.spot.place()))
+                }
                 DiscretiserDraft::Cells { shape, cell } => {
                     let cell = Located { value: cell.clone(), spot: d.spot.clone() };
                     let cell =
@@ -287,5 +302,22 @@ impl Resolver<'_> {
                 }
             },
         }
+    }
+}
+
+/// On what the potential is evaluated: features have no cells.
+fn potential_on(
+    draft: &ExperimentDraft,
+    discretiser: &DiscretiserSpec,
+) -> Result<PhiOn, Diagnostic> {
+    let asked = draft.potential_on.as_ref();
+    match (discretiser, asked.map(|on| on.value)) {
+        (DiscretiserSpec::Features(_), Some(PhiOn::Cell)) => {
+            Err(Diagnostic::error("features have no cells to evaluate the potential on")
+                .at(asked.and_then(|on| on.spot.place()))
+                .hint("leave out `potential_on`: it is evaluated on the state itself"))
+        }
+        (DiscretiserSpec::Features(_), _) => Ok(PhiOn::Raw),
+        (_, on) => Ok(on.unwrap_or(PhiOn::Cell)),
     }
 }

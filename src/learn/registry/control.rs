@@ -1,7 +1,7 @@
 //! Agents that learn action values step by step.
 
 use super::shared::{ALPHA, EPSILON, GAMMA, INITIAL_Q};
-use super::{AgentSpec, AnyAgent, Build};
+use super::{AgentSpec, AnyAgent, Build, linear};
 use crate::learn::{QLearning, Sarsa};
 
 pub(super) const Q_LEARNING: AgentSpec = AgentSpec {
@@ -17,6 +17,7 @@ pub(super) const Q_LEARNING: AgentSpec = AgentSpec {
             setup.stream,
         ))
     }),
+    linear: Some(linear::q_learning),
 };
 
 pub(super) const SARSA: AgentSpec = AgentSpec {
@@ -32,4 +33,5 @@ pub(super) const SARSA: AgentSpec = AgentSpec {
             setup.stream,
         ))
     }),
+    linear: Some(linear::sarsa),
 };

@@ -4,14 +4,15 @@
 //! A family of agents has a file of its own with a constant per agent, which [`AGENTS`] lists.
 
 mod control;
+mod linear;
 mod planners;
 mod shared;
 
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
-use super::{Learn, QLearning, QTable, Sarsa};
+use super::{Learn, LinearSetup, QLearning, QTable, Sarsa};
 use crate::mdp::streams::Stream;
-use crate::shaping::Shielded;
+use crate::shaping::{Fields, Shielded};
 
 /// What a learner is built for.
 #[derive(Debug)]
@@ -56,6 +57,8 @@ pub struct AgentSpec {
     pub params: &'static [ParamSpec],
     /// How it is built.
     pub build: Build,
+    /// How it is built where values are linear in features, if it can learn such.
+    pub linear: Option<fn(&AgentConfig, LinearSetup) -> Box<dyn Learn<Fields>>>,
 }
 
 /// Any agent whose states are the rows of a table, with a shield or without.

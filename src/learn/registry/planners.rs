@@ -32,6 +32,7 @@ pub(super) const VALUE_ITERATION: AgentSpec = AgentSpec {
             max_sweeps: c.int("max_sweeps") as usize,
         })
     }),
+    linear: None,
 };
 
 pub(super) const RANDOM_AGENT: AgentSpec = AgentSpec {
@@ -40,5 +41,8 @@ pub(super) const RANDOM_AGENT: AgentSpec = AgentSpec {
     params: &[GAMMA],
     build: Build::Learner(|c, setup| {
         AnyAgent::tabular(RandomAgent::new(setup.n_actions, c.float("gamma"), setup.stream))
+    }),
+    linear: Some(|c, setup| {
+        Box::new(RandomAgent::new(setup.n_actions, c.float("gamma"), setup.stream))
     }),
 };

@@ -8,7 +8,7 @@
 mod fourier;
 mod tiles;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use fourier::Fourier;
 pub use tiles::Tiles;
@@ -19,7 +19,7 @@ use super::{BinsError, Dim};
 pub const MAX_WEIGHTS: usize = 1 << 24;
 
 /// The kind of features.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FeatureKind {
     /// Tile coding with so many tilings.
@@ -45,11 +45,6 @@ impl FeatureSpec {
             FeatureKind::Tiles(tilings) => tiles::n_features(&self.dims, tilings),
             FeatureKind::Fourier => fourier::n_features(&self.dims),
         }
-    }
-
-    /// The field's range, if the features depend on it.
-    pub fn range(&self, field: usize) -> Option<[f64; 2]> {
-        self.dims.iter().find(|d| d.field == field).map(|d| [d.lo, d.hi])
     }
 }
 
