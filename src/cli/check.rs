@@ -90,7 +90,7 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     let kwargs: Vec<String> = changed.map(|(k, x)| format!("{k}: {x}")).collect();
     let kwargs =
         if kwargs.is_empty() { String::new() } else { format!(" ({})", kwargs.join(", ")) };
-    let params: Vec<String> = v.agent.params.iter().map(|(k, x)| format!("{k}: {x}")).collect();
+    let params: Vec<String> = v.agent.in_effect().map(|(k, x)| format!("{k}: {x}")).collect();
     let limit =
         v.max_steps.map_or("without a step limit".into(), |n| format!("of at most {n} steps"));
     let mut rows = vec![

@@ -1,5 +1,6 @@
 //! Puts together what a variant describes: discretiser, potential, reward, agent.
 
+use super::shielded::playable;
 use crate::learn::planning::PlannedAgent;
 use crate::learn::registry::{Build, Setup};
 use crate::learn::{AnyAgent, Learn, LinearSetup};
@@ -273,6 +274,7 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
         let obs = env.state(s).expect("a finite environment");
         phi[s] = potential.phi(env, s, &obs)?;
     }
+    let base = playable(host, variant, env, base)?;
     let shaped = shaped_model(&base, variant.agent.float("gamma"), &phi);
     Ok(LearnedModel { shaped, phi })
 }
@@ -296,6 +298,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let setup = Setup {
                 n_states: n_cells,
                 n_actions: env.n_actions(),
+                seed,
                 stream: Stream::new(seed, "agent"),
                 initial_q,
             };

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::assemble::{NotAModelError, diagnostic_of, learned_model};
+use super::shielded::playable;
 use crate::audit::{Preservation, Verdict, preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
@@ -129,8 +130,9 @@ impl EnvVisitor for Judge<'_> {
                 }
             },
         };
+        let plain = playable(host, variant, &env, (**plain).clone()).map_err(diagnostic_of)?;
         let gamma = variant.agent.float("gamma");
-        let Ok(result) = preservation(plain, &model.shaped, gamma, &model.phi) else {
+        let Ok(result) = preservation(&plain, &model.shaped, gamma, &model.phi) else {
             return Ok(Audit::new(
                 "inconclusive",
                 None,

@@ -20,6 +20,8 @@ pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
         let scripted = variant.potential.is_some()
             || variant.reward.is_some()
             || !variant.terms.is_empty()
+            || variant.allowed.is_some()
+            || !variant.agent_functions.is_empty()
             || matches!(variant.discretiser, crate::script::DiscretiserSpec::Cells { .. });
         if !scripted {
             continue;

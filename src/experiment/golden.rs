@@ -45,8 +45,7 @@ pub fn text(plan: &Plan) -> Result<String, Diagnostic> {
 const MEMORY: &str = "writing to a string does not fail";
 
 fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diagnostic> {
-    let params: Vec<String> =
-        variant.agent.params.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+    let params: Vec<String> = variant.agent.in_effect().map(|(k, v)| format!("{k}: {v}")).collect();
     writeln!(out, "\nvariant {}", variant.name).expect(MEMORY);
     let kwargs = serde_json::Value::Object(variant.config.kwargs.clone());
     writeln!(out, "  env {} {kwargs}", variant.env.id).expect(MEMORY);

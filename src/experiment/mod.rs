@@ -17,6 +17,7 @@ pub mod golden;
 mod landscape;
 pub mod play;
 mod record;
+mod shielded;
 mod store;
 mod train;
 mod unit;

@@ -2,21 +2,23 @@
 //!
 //! An episode is played in a [`Session`], under the variant's time limit. Its states go through
 //! the variant's discretiser, and the action is the first within the tie tolerance of the best
-//! ([`argmax_tol`]). Where nothing was learned all values are the initial one, so that the first
+//! among those that the shield allows ([`argmax_allowed`]). Where nothing was learned all values are the initial one, so that the first
 //! action is played, which is what greedy choice did in training too. An action is repeated for as
 //! many steps as the variant's `frame_skip` says.
 
 use super::landscape::{Locate, Values};
 use crate::env::rollout::{Event, Length, RolloutError, drive};
 use crate::env::{EnvError, PlayedAction, Session};
-use crate::learn::{LinearQ, QTable, argmax_tol};
+use crate::learn::{LinearQ, QTable, argmax_allowed};
 use crate::mdp::numpy::Seed;
 use crate::mdp::{Action, Ending};
 use crate::script::{Host, Variant};
+use crate::shaping::{ActionSet, Fault, ShieldFn, Shielded};
 
 /// A greedy policy.
 pub struct Policy {
     values: Values,
+    shield: Option<ShieldFn>,
     /// For how many steps an action is played.
     frame_skip: u32,
     /// The action that is played now.
@@ -27,28 +29,38 @@ impl Policy {
     /// The policy of `variant` that is greedy with respect to `q`, the table (or the weights) of
     /// one of its units.
     pub fn new(host: &Host, variant: &Variant, session: &Session, q: QTable) -> Self {
+        let shield = variant
+            .allowed
+            .as_ref()
+            .map(|allowed| host.callbacks().shield(allowed, q.n_actions(), session.schema()));
         let values = Values::new(host, variant, session.schema(), q);
-        Self { values, frame_skip: variant.frame_skip, held: 0 }
+        Self { values, shield, frame_skip: variant.frame_skip, held: 0 }
     }
 
     /// The policy of a table that has one row per state of a finite environment.
     pub fn of_states(q: QTable) -> Self {
-        Self { values: Values::Table(Locate::Index, q), frame_skip: 1, held: 0 }
+        let values = Values::Table(Locate::Index, q);
+        Self { values, shield: None, frame_skip: 1, held: 0 }
     }
 
     /// The policy of values that are linear in features; an action is played for `frame_skip` steps.
     pub fn of_weights(q: LinearQ, frame_skip: u32) -> Self {
-        Self { values: Values::linear(q), frame_skip, held: 0 }
+        Self { values: Values::linear(q), shield: None, frame_skip, held: 0 }
     }
 
     /// The action for the session's present state.
     ///
     /// # Errors
-    /// If a scripted discretiser fails.
+    /// If a scripted discretiser or shield fails.
     pub fn action(&mut self, session: &Session) -> Result<PlayedAction, RolloutError> {
         if session.elapsed().is_multiple_of(self.frame_skip) {
-            let row = self.values.present(session).map_err(|f| RolloutError::Policy(f.0))?;
-            self.held = argmax_tol(row);
+            let failed = |f: Fault| RolloutError::Policy(f.0);
+            let allowed = match &mut self.shield {
+                Some(shield) => shield(session.fields()).map_err(failed)?,
+                None => ActionSet::ALL,
+            };
+            let row = self.values.present(session).map_err(failed)?;
+            self.held = argmax_allowed(row, Shielded { cell: 0, allowed });
         }
         Ok(session.action(self.held))
     }

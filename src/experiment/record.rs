@@ -50,6 +50,7 @@ pub struct Learned {
 impl Learned {
     /// Of weights of `features`: the values at `states`, a row each. Something was learned where it
     /// was of one of the state's features.
+    #[must_use]
     pub fn at(self, features: &Features, states: &[Vec<f64>]) -> Self {
         let mut active = features.active();
         let mut known = |state: &Vec<f64>| {

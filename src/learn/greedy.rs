@@ -1,4 +1,4 @@
-//! Greedy choice with a tolerance, and ε-greedy behaviour.
+//! Greedy choice with a tolerance, and choice among allowed actions.
 //!
 //! Rounding must not decide a tie: potential-based shaping leaves two equally good actions equal
 //! in theory and apart in the last bit in practice, and from there on two learners that are the
@@ -6,9 +6,8 @@
 //! largest count as tied, and the first of the tied is taken.
 
 use super::q_table::max;
-use super::{QTable, Schedule, ScheduleState, Seen};
+use super::{QTable, Seen};
 use crate::mdp::Action;
-use crate::mdp::streams::Stream;
 
 /// Relative width of a tie.
 const TIE: f64 = 1e-9;
@@ -25,6 +24,14 @@ fn threshold(row: &[f64]) -> f64 {
 pub fn argmax_tol(row: &[f64]) -> Action {
     let threshold = threshold(row);
     row.iter().position(|&q| q >= threshold).unwrap_or(0)
+}
+
+/// Whether `action` is within the tie tolerance of the largest value among the actions that `s`
+/// allows.
+#[inline]
+pub(super) fn is_greedy<S: Seen>(row: &[f64], s: S, action: Action) -> bool {
+    let best = max_allowed(row, s);
+    row[action] >= best - TIE * best.abs().max(1.0)
 }
 
 /// The largest value among the actions that `s` allows.
@@ -78,46 +85,6 @@ pub fn greedy_sets(q: &QTable) -> Vec<Vec<Action>> {
     (0..q.n_states()).map(|s| greedy_set(q.row(s), scale)).collect()
 }
 
-/// ε-greedy behaviour. Draws exactly one 64-bit number per choice, whatever comes of it, so that
-/// two learners with the same seed stay on the same stream.
-#[derive(Debug, Clone)]
-pub struct Behaviour {
-    epsilon: ScheduleState,
-    stream: Stream,
-}
-
-impl Behaviour {
-    /// ε by `schedule`, randomness from `stream`.
-    pub fn new(schedule: Schedule, stream: Stream) -> Self {
-        Self { epsilon: ScheduleState::new(schedule), stream }
-    }
-
-    /// Chooses among the actions that `s` allows: with probability ε uniformly at random, else by
-    /// [`argmax_tol`].
-    #[inline]
-    pub fn choose<S: Seen>(&mut self, row: &[f64], s: S) -> Action {
-        let epsilon = self.epsilon.value();
-        let u = self.stream.uniform();
-        self.epsilon.step();
-        if u < epsilon {
-            // Given u < ε, u / ε is uniform in [0, 1): it picks the action without another draw.
-            pick_allowed(row.len(), s, u / epsilon)
-        } else {
-            argmax_allowed(row, s)
-        }
-    }
-
-    /// ε at present.
-    pub fn epsilon(&self) -> f64 {
-        self.epsilon.value()
-    }
-
-    /// Tells a per-episode schedule that an episode has ended.
-    pub fn end_episode(&mut self) {
-        self.epsilon.end_episode();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,30 +103,5 @@ mod tests {
         assert_eq!(greedy_set(&[1.0, 1.0 + 1e-12, 0.5], 1.0), [0, 1]);
         assert_eq!(greedy_set(&[1.0, 1.0 + 1e-8, 0.5], 1.0), [1]);
         assert_eq!(greedy_set(&[1.0, 1.0 + 1e-8, 0.5], 1e3), [0, 1]);
-    }
-
-    #[test]
-    fn epsilon_greedy_explores_at_the_stated_rate_and_uniformly() {
-        let mut b = Behaviour::new(Schedule::constant(0.4), Stream::new(1, "test"));
-        let mut counts = [0u32; 4];
-        for _ in 0..100_000 {
-            counts[b.choose(&[0.0, 1.0, 0.0, 0.0], 0)] += 1;
-        }
-        // Each other action: 10 %, standard deviation 95; the greedy one 70 %.
-        for a in [0, 2, 3] {
-            assert!((9_400..10_600).contains(&counts[a]), "{counts:?}");
-        }
-        assert!((69_100..70_900).contains(&counts[1]), "{counts:?}");
-    }
-
-    #[test]
-    fn one_draw_per_choice_whatever_the_branch() {
-        let mut explorer = Behaviour::new(Schedule::constant(1.0), Stream::new(3, "test"));
-        let mut miser = Behaviour::new(Schedule::constant(0.0), Stream::new(3, "test"));
-        for _ in 0..100 {
-            explorer.choose(&[0.0, 1.0], 0);
-            miser.choose(&[0.0, 1.0], 0);
-        }
-        assert_eq!(explorer.stream.next_u64(), miser.stream.next_u64());
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::registry::{AgentSpec, Build};
-use super::{Schedule, Unit};
+use super::{AlphaSource, Exploration, Schedule, Unit};
 
 /// The value of an agent's parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -17,6 +17,13 @@ pub enum ParamValue {
     Float(f64),
     /// A schedule.
     Schedule(Schedule),
+    /// A step size by the number of visits.
+    VisitCount {
+        /// `N^−omega`.
+        omega: f64,
+    },
+    /// A behaviour policy.
+    Exploration(Exploration),
     /// One of several words.
     Word(&'static str),
     /// A script's function, which the script host keeps.
@@ -30,6 +37,9 @@ impl std::fmt::Display for ParamValue {
             Self::Float(x) => write!(f, "{x:?}"),
             Self::Word(word) => write!(f, "{word:?}"),
             Self::Function => write!(f, "a function"),
+            Self::VisitCount { omega: 1.0 } => write!(f, "visit_count()"),
+            Self::VisitCount { omega } => write!(f, "visit_count({omega:?})"),
+            Self::Exploration(exploration) => write!(f, "{exploration}"),
             Self::Schedule(Schedule::Constant { value }) => write!(f, "{value:?}"),
             Self::Schedule(Schedule::Linear { start, end, over, unit }) => {
                 write!(f, "linear({start:?}, {end:?}, {over}{})", steps(*unit))
@@ -71,6 +81,10 @@ pub enum ParamKind {
         /// Whether 0 is excluded.
         open: bool,
     },
+    /// A step size: a rate above 0, or one that goes by visits.
+    StepSize,
+    /// A behaviour policy.
+    Exploration,
     /// One of these words.
     Word(&'static [&'static str]),
 }
@@ -95,6 +109,12 @@ impl ParamKind {
             Self::Rate { open: true } => {
                 "a number above 0 and at most 1, or a schedule of such".into()
             }
+            Self::StepSize => {
+                "a number above 0 and at most 1, a schedule of such, or visit_count()".into()
+            }
+            Self::Exploration => {
+                format!("{:?}, softmax(temperature) or ucb(c)", Exploration::DEFAULT)
+            }
         }
     }
 
@@ -112,7 +132,10 @@ impl ParamKind {
                 (above && number <= max && number.is_finite()).then_some(ParamValue::Float(number))
             }
             (Self::Int { min }, ParamValue::Int(n)) => (n >= min).then_some(value),
-            (Self::Word(_) | Self::Int { .. }, _) => None,
+            (Self::StepSize, ParamValue::VisitCount { .. })
+            | (Self::Exploration, ParamValue::Exploration(_)) => Some(value),
+            (Self::StepSize, _) => Self::Rate { open: true }.accept(value),
+            (Self::Word(_) | Self::Int { .. } | Self::Exploration, _) => None,
             (Self::Rate { open }, _) => {
                 let schedule = match value {
                     ParamValue::Schedule(schedule) => schedule,
@@ -200,6 +223,35 @@ impl AgentConfig {
             ParamValue::Int(n) => Schedule::constant(n as f64),
             _ => unreachable!("{name} is a schedule"),
         }
+    }
+
+    /// A step size.
+    ///
+    /// # Panics
+    /// If the agent has no such parameter: the registry's own mistake.
+    pub fn alpha(&self) -> AlphaSource {
+        match self.params["alpha"] {
+            ParamValue::VisitCount { omega } => AlphaSource::VisitCount { omega },
+            _ => AlphaSource::Schedule(self.schedule("alpha")),
+        }
+    }
+
+    /// The behaviour policy; ε-greedy if the agent has no such parameter.
+    pub fn exploration(&self) -> Exploration {
+        match self.params.get("exploration") {
+            Some(ParamValue::Exploration(exploration)) => *exploration,
+            _ => Exploration::EpsilonGreedy,
+        }
+    }
+
+    /// The parameters that play a part: ε does with ε-greedy behaviour only, which goes without
+    /// saying.
+    pub fn in_effect(&self) -> impl Iterator<Item = (&'static str, ParamValue)> {
+        let unsaid = match self.exploration() {
+            Exploration::EpsilonGreedy => "exploration",
+            Exploration::Softmax { .. } | Exploration::Ucb { .. } => "epsilon",
+        };
+        self.params.iter().filter(move |(name, _)| **name != unsaid).map(|(k, v)| (*k, *v))
     }
 
     /// One of several words.

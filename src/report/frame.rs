@@ -8,7 +8,7 @@ use super::stored::StoredError;
 use crate::experiment::{Landscape, ListedState};
 use crate::mdp::{Field, FieldKind};
 use crate::script::{DiscretiserSpec, Variant, suggest};
-use crate::shaping::{Bins, FeatureSpec};
+use crate::shaping::Bins;
 
 /// Places along an axis whose field is not cut into bins.
 const UNBINNED: usize = 60;
@@ -207,18 +207,16 @@ fn acting(states: &[ListedState]) -> Vec<&ListedState> {
     states.iter().filter(|s| s.acts).collect()
 }
 
-/// The fields that tell states apart: the binned ones; on finite environments the first whole
+/// The fields that tell states apart: those with bins or features; on finite environments the first whole
 /// numbers that do (a state's index does too, but says nothing); else all.
 fn telling(landscape: &Landscape, variant: &Variant) -> Vec<usize> {
     let fields = &landscape.schema.fields;
-    let states = match (&variant.discretiser, &landscape.states) {
-        (DiscretiserSpec::Bins(dims), _)
-        | (DiscretiserSpec::Features(FeatureSpec { dims, .. }), _) => {
-            return dims.iter().map(|d| d.field).collect();
-        }
-        (_, Some(states)) => states,
-        _ => return (0..fields.len()).collect(),
-    };
+    let cut: Vec<usize> =
+        (0..fields.len()).filter(|&f| variant.discretiser.range(f).is_some()).collect();
+    if !cut.is_empty() {
+        return cut;
+    }
+    let Some(states) = &landscape.states else { return (0..fields.len()).collect() };
     if landscape.schema.grid.is_some() {
         let place = |name| fields.iter().position(|f| f.name == name);
         return [place("row"), place("col")].into_iter().flatten().collect();

@@ -1,154 +1,22 @@
-//! `tiles(…)` and `fourier(…)`: discretisers that are none, but give features for linear values.
+//! Features for linear values: which ones a script asks for, and whether they can be had.
 
-use std::rc::Rc;
-
-use rhai::{Array, Dynamic, Engine, EvalAltResult, Map, NativeCallContext};
-
-use super::builders::Call;
 use super::diagnostic::Diagnostic;
-use super::draft::{BinDraft, DiscretiserDraft, Located, Spot};
-use super::engine::Context;
-use super::params::{number, show, whole};
+use super::draft::{BinDraft, Located, Spot};
 use super::world::field_of;
 use crate::env::EnvSpec;
-use crate::learn::AgentConfig;
 use crate::learn::registry::AGENTS;
+use crate::learn::{AgentConfig, Exploration, ParamValue};
 use crate::mdp::{FieldKind, Schema};
 use crate::shaping::{Dim, FeatureKind, FeatureSpec, Features, MAX_WEIGHTS, Scale};
-
-type Fallible<T> = Result<T, Box<EvalAltResult>>;
-
-/// The most tilings, and the highest order.
-const MOST: i64 = 1024;
 
 /// `tiles(…)` or `fourier(…)` as it was written.
 #[derive(Debug, Clone)]
 pub(super) struct FeaturesDraft {
-    kind: FeatureKind,
+    pub(super) kind: FeatureKind,
     /// The fields with their ranges and numbers of tiles, or the order.
     pub(super) ranges: Vec<BinDraft>,
     /// The order of the Fourier basis over all fields, where no range is written.
-    order: Option<usize>,
-}
-
-/// Registers the builders.
-pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
-    let c = context.clone();
-    engine.register_fn("tiles", move |native: NativeCallContext, map: Map| -> Fallible<_> {
-        let call = Call::new(&c, &native);
-        call.finish(tiles_of_map(&call, &map))
-    });
-    let c = context.clone();
-    engine.register_fn(
-        "tiles",
-        move |native: NativeCallContext, list: Array, tilings: Dynamic| -> Fallible<_> {
-            let call = Call::new(&c, &native);
-            call.finish((|| {
-                let tilings = count("tilings", &tilings, &call.arg(1))?;
-                let ranges = list.iter().enumerate();
-                let ranges = ranges
-                    .map(|(i, value)| tiled(Err(i), value, call.key(&i.to_string())))
-                    .collect::<Result<_, _>>()?;
-                Ok(draft(FeatureKind::Tiles(tilings), ranges, None))
-            })())
-        },
-    );
-    let c = context.clone();
-    engine.register_fn("fourier", move |native: NativeCallContext, map: Map| -> Fallible<_> {
-        let call = Call::new(&c, &native);
-        call.finish(fourier_of_map(&call, &map))
-    });
-    let c = context.clone();
-    engine.register_fn("fourier", move |native: NativeCallContext, order: i64| -> Fallible<_> {
-        let call = Call::new(&c, &native);
-        let order = call.finish(count("order", &order.into(), &call.arg(0)))?;
-        Ok(draft(FeatureKind::Fourier, Vec::new(), Some(order)))
-    });
-}
-
-fn draft(kind: FeatureKind, ranges: Vec<BinDraft>, order: Option<usize>) -> DiscretiserDraft {
-    DiscretiserDraft::Features(FeaturesDraft { kind, ranges, order })
-}
-
-/// The number of tilings, or the order.
-fn count(what: &str, value: &Dynamic, spot: &Spot) -> Result<usize, Diagnostic> {
-    let n = whole(&format!("`{what}`"), value, 1, MOST).map_err(|d| d.at(spot.place()))?;
-    Ok(n as usize)
-}
-
-fn tiles_of_map(call: &Call<'_>, map: &Map) -> Result<DiscretiserDraft, Diagnostic> {
-    let tilings = map.get("tilings").ok_or_else(|| {
-        Diagnostic::error("`tiles` does not say how many `tilings` there are")
-            .hint("add, for example, `tilings: 8`")
-    })?;
-    let tilings = count("tilings", tilings, &call.key("tilings"))?;
-    let fields = map.iter().filter(|(key, _)| *key != "tilings");
-    let ranges = fields
-        .map(|(key, value)| tiled(Ok(key.to_string()), value, call.key(key)))
-        .collect::<Result<_, _>>()?;
-    Ok(draft(FeatureKind::Tiles(tilings), ranges, None))
-}
-
-fn fourier_of_map(call: &Call<'_>, map: &Map) -> Result<DiscretiserDraft, Diagnostic> {
-    let order = map.get("order").ok_or_else(|| {
-        Diagnostic::error("`fourier` does not say which `order` it has")
-            .hint("add, for example, `order: 3`")
-    })?;
-    let order = count("order", order, &call.key("order"))?;
-    let mut ranges = Vec::new();
-    for (key, value) in map.iter().filter(|(key, _)| *key != "order") {
-        let (field, spot) = (Ok(key.to_string()), call.key(key));
-        let wrong = || {
-            Diagnostic::error(format!("`{key}` of `fourier` is [lo, hi], got {}", show(value)))
-                .at(spot.place())
-        };
-        let list = value.read_lock::<Array>().ok_or_else(wrong)?;
-        let [lo, hi] = list.as_slice() else { return Err(wrong()) };
-        let (Some(lo), Some(hi)) = (number(lo), number(hi)) else { return Err(wrong()) };
-        ranges.push(checked(BinDraft { field, lo, hi, n: order, spot })?);
-    }
-    let order = ranges.is_empty().then_some(order);
-    Ok(draft(FeatureKind::Fourier, ranges, order))
-}
-
-/// What a field is called in messages.
-fn label(field: &Result<String, usize>) -> String {
-    match field {
-        Ok(name) => format!("`{name}`"),
-        Err(i) => format!("number {}", i + 1),
-    }
-}
-
-/// The `[lo, hi, n]` of a field that is tiled.
-fn tiled(
-    field: Result<String, usize>,
-    value: &Dynamic,
-    spot: Spot,
-) -> Result<BinDraft, Diagnostic> {
-    let label = label(&field);
-    let wrong = || {
-        Diagnostic::error(format!("{label} of `tiles` is [lo, hi, n], got {}", show(value)))
-            .at(spot.place())
-    };
-    let list = value.read_lock::<Array>().ok_or_else(wrong)?;
-    let [lo, hi, n] = list.as_slice() else { return Err(wrong()) };
-    let (Some(lo), Some(hi)) = (number(lo), number(hi)) else { return Err(wrong()) };
-    let n = whole(&format!("the number of tiles of {label}"), n, 1, MAX_WEIGHTS as i64)
-        .map_err(|d| d.at(spot.place()))? as usize;
-    checked(BinDraft { field, lo, hi, n, spot: spot.clone() })
-}
-
-/// The range of a field, which goes upwards and is finite.
-fn checked(range: BinDraft) -> Result<BinDraft, Diagnostic> {
-    let BinDraft { field, lo, hi, spot, .. } = &range;
-    if lo >= hi || !lo.is_finite() || !hi.is_finite() {
-        return Err(Diagnostic::error(format!(
-            "{} goes from {lo} to {hi}: the lower bound must be below the upper, both finite",
-            label(field)
-        ))
-        .at(spot.place()));
-    }
-    Ok(range)
+    pub(super) order: Option<usize>,
 }
 
 /// What features are resolved against.
@@ -167,29 +35,11 @@ pub(super) fn resolve(
     at: &Surroundings<'_>,
     warnings: &mut Vec<Diagnostic>,
 ) -> Result<FeatureSpec, Diagnostic> {
-    let Surroundings { spec, schema, normalise, agent } = at;
-    if agent.value.spec.linear.is_none() {
-        let able = AGENTS.iter().filter(|a| a.linear.is_some()).map(|a| a.name);
-        return Err(Diagnostic::error(format!(
-            "`{}` cannot learn values that are linear in features",
-            agent.value.spec.name
-        ))
-        .at(agent.spot.place())
-        .hint(format!("these can: {}", able.collect::<Vec<_>>().join(", "))));
-    }
+    let Surroundings { schema, agent, .. } = at;
+    able(&agent.value, draft.kind).map_err(|d| d.at(agent.spot.place()))?;
     let mut dims = match draft.order {
         Some(order) => all_fields(order, at)?,
-        None => {
-            let mut dims = Vec::with_capacity(draft.ranges.len());
-            for range in &draft.ranges {
-                let field = field_of(range, schema, spec, "range")?;
-                let scale = normalise.iter().find(|scale| scale.field == field);
-                let physical = |x| scale.map_or(x, |scale: &Scale| scale.physical(x));
-                let (lo, hi) = (physical(range.lo), physical(range.hi));
-                dims.push(Dim { field, lo, hi, n: range.n });
-            }
-            dims
-        }
+        None => draft.ranges.iter().map(|range| physical(range, at)).collect::<Result<_, _>>()?,
     };
     dims.sort_by_key(|d| d.field);
     let features = FeatureSpec { kind: draft.kind, dims };
@@ -208,6 +58,47 @@ pub(super) fn resolve(
     Features::new(&features).map_err(|e| Diagnostic::error(e.message))?;
     warnings.extend(alike(&features, schema).map(|d| d.at(spot.place())));
     Ok(features)
+}
+
+/// Whether `agent` can learn values that are linear in features of this kind.
+fn able(agent: &AgentConfig, kind: FeatureKind) -> Result<(), Diagnostic> {
+    let name = agent.spec.name;
+    if agent.spec.linear.is_none() {
+        let able = AGENTS.iter().filter(|a| a.linear.is_some()).map(|a| a.name);
+        return Err(Diagnostic::error(format!(
+            "`{name}` cannot learn values that are linear in features"
+        ))
+        .hint(format!("these can: {}", able.collect::<Vec<_>>().join(", "))));
+    }
+    let param = |name| agent.params.get(name);
+    let counted = if let Some(ParamValue::VisitCount { .. }) = param("alpha") {
+        Some(("alpha", "a number or a schedule"))
+    } else if let Exploration::Ucb { .. } = agent.exploration() {
+        Some(("exploration", "\"epsilon_greedy\" or softmax(..)"))
+    } else {
+        None
+    };
+    if let Some((param, instead)) = counted {
+        return Err(Diagnostic::error(format!(
+            "the `{param}` of `{name}` counts visits, and features have no states to be counted"
+        ))
+        .hint(format!("use {instead}")));
+    }
+    if kind == FeatureKind::Fourier && param("traces") == Some(&ParamValue::Word("replacing")) {
+        return Err(Diagnostic::error(
+            "replacing traces are defined for features that are 0 or 1, as tiles are",
+        )
+        .hint("with `fourier`, use `traces: \"accumulating\"` or \"dutch\""));
+    }
+    Ok(())
+}
+
+/// A range with its field found, in physical units.
+fn physical(range: &BinDraft, at: &Surroundings<'_>) -> Result<Dim, Diagnostic> {
+    let field = field_of(range, at.schema, at.spec, "range")?;
+    let scale = at.normalise.iter().find(|scale| scale.field == field);
+    let [lo, hi] = [range.lo, range.hi].map(|x| scale.map_or(x, |scale| scale.physical(x)));
+    Ok(Dim { field, lo, hi, n: range.n })
 }
 
 /// Every field that is a number, with the range that it is normalised from or has by itself.

@@ -67,6 +67,17 @@ const BUILDERS: &[(&str, &str, &str)] = &[
         "exponential(start, factor, min [, #{ steps: true }])",
         "start · factorⁿ per episode (or step), at least min",
     ),
+    (
+        "visit_count",
+        "visit_count() or visit_count(omega)",
+        "a step size: 1/N(s, a), or N(s, a)^-omega",
+    ),
+    ("softmax", "softmax(temperature)", "exploration: actions weigh exp(Q / temperature)"),
+    (
+        "ucb",
+        "ucb(c)",
+        "exploration: the largest Q + c √(ln N(s) / N(s, a)), actions never tried first",
+    ),
 ];
 
 const MATHEMATICS: &[(&str, &str, &str)] = &[

@@ -7,7 +7,13 @@ use super::draft::{AgentDraft, Located, Spot, captured_now};
 use super::errors::type_name;
 use super::value::Value;
 use crate::learn::registry::AgentSpec;
-use crate::learn::{ParamKind, ParamValue, Schedule};
+use crate::learn::{Exploration, ParamKind, ParamValue, Schedule};
+
+/// What `visit_count(..)` returns: α = N(s, a)^−omega.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct VisitCount {
+    pub(super) omega: f64,
+}
 
 /// A value in words, for messages: `"abc"`, `3`, `a function`.
 pub(super) fn show(value: &Dynamic) -> String {
@@ -25,8 +31,8 @@ pub(super) fn show(value: &Dynamic) -> String {
         let text = value.to_string();
         return if text.chars().count() > 60 { "an array".into() } else { text };
     }
-    if let Some(schedule) = value.clone().try_cast::<Schedule>() {
-        return ParamValue::Schedule(schedule).to_string();
+    if let Some(parameter) = built(&value) {
+        return parameter.to_string();
     }
     if value.is_map() {
         return "a map".into();
@@ -128,7 +134,15 @@ pub(super) fn merge_agent(
         agent.functions.remove(param.name);
         agent.params.insert(param.name, accepted);
     }
-    Ok(())
+    match agent.params.get("exploration") {
+        Some(ParamValue::Exploration(Exploration::EpsilonGreedy)) | None => Ok(()),
+        Some(policy) if map.contains_key("epsilon") => {
+            Err(Diagnostic::error(format!("`epsilon` plays no part with {policy}"))
+                .at(spot("epsilon").place())
+                .hint("leave it out, or say `exploration: \"epsilon_greedy\"`"))
+        }
+        Some(_) => Ok(()),
+    }
 }
 
 /// A script's value as a parameter's, NaN if it is nothing that a parameter can be.
@@ -144,7 +158,22 @@ fn raw(value: &Dynamic, kind: ParamKind) -> ParamValue {
         let known = words.iter().find(|known| **known == word);
         return known.map_or(ParamValue::Float(f64::NAN), |word| ParamValue::Word(word));
     }
-    flat.try_cast::<Schedule>().map_or(ParamValue::Float(f64::NAN), ParamValue::Schedule)
+    if let (ParamKind::Exploration, Some(Exploration::DEFAULT)) = (kind, text(&flat).as_deref()) {
+        return ParamValue::Exploration(Exploration::EpsilonGreedy);
+    }
+    built(&flat).unwrap_or(ParamValue::Float(f64::NAN))
+}
+
+/// What a function has built as the value of a parameter.
+fn built(value: &Dynamic) -> Option<ParamValue> {
+    let cast = value.clone();
+    cast.try_cast::<Schedule>()
+        .map(ParamValue::Schedule)
+        .or_else(|| value.clone().try_cast().map(ParamValue::Exploration))
+        .or_else(|| {
+            let VisitCount { omega } = value.clone().try_cast()?;
+            Some(ParamValue::VisitCount { omega })
+        })
 }
 
 /// The `#{ steps: true }` at the end of a schedule; `spot` finds the place of a key.

@@ -196,7 +196,7 @@ impl Variant {
             }
         };
         let params: Map<String, Json> =
-            self.agent.params.iter().map(|(k, v)| ((*k).into(), serde_json::json!(v))).collect();
+            self.agent.in_effect().map(|(k, v)| (k.into(), serde_json::json!(v))).collect();
         let functions: Map<String, Json> =
             self.agent_functions.iter().map(|(k, c)| ((*k).into(), digest(c))).collect();
         let terms: Map<String, Json> =

@@ -13,6 +13,11 @@ pub trait Seen: Copy + 'static {
     /// The row of a table that stands for it; 0 where states are told apart by their numbers.
     fn cell(&self) -> usize;
 
+    /// What may be taken.
+    fn allowed(&self) -> ActionSet {
+        ActionSet::ALL
+    }
+
     /// Whether `action` may be taken.
     fn allows(&self, _action: Action) -> bool {
         true
@@ -62,6 +67,11 @@ impl Seen for Shielded {
     }
 
     #[inline]
+    fn allowed(&self) -> ActionSet {
+        self.allowed
+    }
+
+    #[inline]
     fn allows(&self, action: Action) -> bool {
         self.allowed.contains(action)
     }
@@ -82,6 +92,11 @@ impl Seen for Fields {
     #[inline]
     fn cell(&self) -> usize {
         0
+    }
+
+    #[inline]
+    fn allowed(&self) -> ActionSet {
+        self.allowed
     }
 
     #[inline]

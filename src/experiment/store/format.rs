@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use crate::experiment::hex;
 use crate::experiment::record::{EpisodeRow, UnitRecord};
-use crate::learn::{QTable, argmax_tol};
+use crate::learn::{ParamValue, QTable, argmax_tol};
 use crate::mdp::Ending;
 use crate::script::{DiscretiserSpec, Variant};
 
@@ -109,9 +109,13 @@ pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
     Ok(rows)
 }
 
-/// The value that a variant's table starts with; `None` for planners, which leave none of it.
+/// The value that a variant's table starts with; `None` for planners, which leave none of it, and
+/// where a function gives each its own.
 pub(super) fn initial_value(variant: &Variant) -> Option<f64> {
-    variant.agent.params.contains_key("initial_q").then(|| variant.agent.float("initial_q"))
+    match variant.agent.params.get("initial_q") {
+        Some(ParamValue::Float(x)) => Some(*x),
+        _ => None,
+    }
 }
 
 /// Whether a row still holds the initial value everywhere: nothing was learned there.

@@ -1,15 +1,20 @@
-//! Q-learning and SARSA on linear action values: semi-gradient, ε-greedy, with eligibility traces
-//! or without.
+//! Q-learning and SARSA on linear action values: semi-gradient, with eligibility traces or without.
 //!
 //! ```text
 //! δ = R + γ v(S′) − q(S, A)
 //! w ← w + α δ ∇q(S, A)      without traces (Sutton & Barto 2018, sections 10.1 and 11.1)
-//! w ← w + α δ z             with traces (section 12.7)
+//! w ← w + α δ z             with traces (sections 12.7 and 12.10)
 //! ```
+//!
+//! z fades by γλ, and a visit adds x to it (accumulating), sets it to 1 where x is 1 (replacing), or
+//! adds `(1 − α zᵀx) x` (dutch), z having faded.
 
-use super::{LinearQ, TraceKind, Traces};
-use crate::learn::greedy::max_allowed;
-use crate::learn::{Agent, Behaviour, Last, Learn, QTable, Schedule, ScheduleState, td_error};
+use super::LinearQ;
+use crate::learn::control::{Trace, Traces};
+use crate::learn::greedy::{is_greedy, max_allowed};
+use crate::learn::{
+    Agent, Behaviour, Explore, Last, Learn, QTable, Schedule, ScheduleState, td_error,
+};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 use crate::shaping::{Active, Features, Fields};
@@ -30,8 +35,12 @@ pub struct LinearSetup {
 pub enum Target {
     /// `max_a q(S′, a)`: Q-learning. A′ is chosen after the update, as in tables.
     Max,
+    /// The same, A′ being chosen before the update; if it is not greedy, traces end: Watkins's Q(λ).
+    Watkins,
     /// `q(S′, A′)`: SARSA. A′ is chosen before the update, and played.
     Sarsa,
+    /// `Σ_a π(a | S′) q(S′, a)`: expected SARSA. A′ is chosen after the update.
+    Expected,
 }
 
 /// A learner on linear action values.
@@ -58,30 +67,29 @@ pub struct LinearLearner {
 }
 
 impl LinearLearner {
-    /// A learner that starts from `q`; exploration draws from `stream`.
+    /// A learner that starts from `q`.
     pub fn new(
         q: LinearQ,
         target: Target,
         gamma: f64,
         alpha: Schedule,
-        epsilon: Schedule,
-        stream: Stream,
+        behaviour: Behaviour,
     ) -> Self {
         let (s, next) = (q.features().active(), q.features().active());
         let row = vec![0.0; q.weights().n_actions()];
-        let (alpha, behaviour) = (ScheduleState::new(alpha), Behaviour::new(epsilon, stream));
+        let alpha = ScheduleState::new(alpha);
         Self { q, target, gamma, alpha, behaviour, traces: None, s, next, a: 0, row }
     }
 
-    /// The same with eligibility traces that fade by `γλ`.
+    /// The same with eligibility traces, one per weight.
     ///
     /// # Panics
-    /// If traces are to be replacing and the features are not binary.
-    pub fn with_traces(mut self, kind: TraceKind, lambda: f64) -> Self {
-        let is_defined = kind != TraceKind::Replacing || self.q.features().is_binary();
+    /// If traces are replacing and the features are not binary.
+    #[must_use]
+    pub fn with_traces(self, traces: Traces) -> Self {
+        let is_defined = traces.kind() != Trace::Replacing || self.q.features().is_binary();
         assert!(is_defined, "replacing traces are defined for binary features only");
-        self.traces = Some(Traces::new(kind, &self.q, self.gamma, lambda));
-        self
+        Self { traces: Some(traces), ..self }
     }
 
     /// Looks at the state `s`: its features, and its action values.
@@ -97,6 +105,14 @@ impl LinearLearner {
         self.behaviour.choose(&self.row, s)
     }
 
+    /// `z ← 0`.
+    #[inline]
+    fn forget(&mut self) {
+        if let Some(traces) = &mut self.traces {
+            traces.clear();
+        }
+    }
+
     /// The state looked at is where `a` is played.
     #[inline]
     fn play(&mut self, a: Action) -> Action {
@@ -105,17 +121,33 @@ impl LinearLearner {
         a
     }
 
+    /// What is bootstrapped from in the state looked at, and the next action if it is chosen before
+    /// the update.
+    #[inline]
+    fn target(&mut self, next: Fields) -> (f64, Option<Action>) {
+        let row = &self.row;
+        match self.target {
+            Target::Max => (max_allowed(row, next), None),
+            Target::Expected => (self.behaviour.expected(row, next), None),
+            Target::Watkins => (max_allowed(row, next), Some(self.behaviour.choose(row, next))),
+            Target::Sarsa => {
+                let a = self.behaviour.choose(row, next);
+                (row[a], Some(a))
+            }
+        }
+    }
+
     /// `w ← w + α δ ∇q(S, A)`, or along the traces.
     #[inline]
     fn update(&mut self, reward: f64, next_value: f64) {
+        let Self { q, s, a, .. } = self;
         let alpha = self.alpha.value();
-        let q = self.q.value(&self.s, self.a);
-        let size = alpha * td_error(q, reward, self.gamma, next_value);
+        let size = alpha * td_error(q.value(s, *a), reward, self.gamma, next_value);
         match &mut self.traces {
-            None => self.q.learn(&self.s, self.a, size),
+            None => q.learn(s, *a, size),
             Some(traces) => {
-                traces.raise(&self.s, self.a, alpha);
-                traces.learn(&mut self.q, size);
+                q.raise(traces, s, *a, alpha);
+                q.learn_along(traces, size);
             }
         }
         self.alpha.step();
@@ -153,19 +185,17 @@ impl Learn<Fields> for LinearLearner {
 
     fn step(&mut self, reward: f64, next: Fields) -> Action {
         self.look(&next);
-        let a = match self.target {
-            Target::Sarsa => {
-                let a = self.choose(next);
-                self.update(reward, self.row[a]);
-                a
+        let (value, chosen) = self.target(next);
+        self.update(reward, value);
+        if let Some(a) = chosen {
+            if self.target == Target::Watkins && !is_greedy(&self.row, next, a) {
+                self.forget();
             }
-            Target::Max => {
-                self.update(reward, max_allowed(&self.row, next));
-                // The update may have changed the values here too.
-                self.q.values(&self.next, &mut self.row);
-                self.choose(next)
-            }
-        };
+            return self.play(a);
+        }
+        // The update may have changed the values here too.
+        self.q.values(&self.next, &mut self.row);
+        let a = self.choose(next);
         self.play(a)
     }
 
@@ -175,18 +205,14 @@ impl Learn<Fields> for LinearLearner {
             Last::Truncated(next) => {
                 self.look(&next);
                 match self.target {
-                    Target::Sarsa => {
-                        let a = self.choose(next);
-                        self.row[a]
-                    }
-                    Target::Max => max_allowed(&self.row, next),
+                    // Nothing is played here.
+                    Target::Watkins => max_allowed(&self.row, next),
+                    _ => self.target(next).0,
                 }
             }
         };
         self.update(reward, value);
-        if let Some(traces) = &mut self.traces {
-            traces.clear();
-        }
+        self.forget();
         self.alpha.end_episode();
         self.behaviour.end_episode();
     }

@@ -1,6 +1,7 @@
 //! Features and weights.
 
 use crate::learn::QTable;
+use crate::learn::control::{Trace, Traces};
 use crate::mdp::Action;
 use crate::shaping::{Active, Features};
 
@@ -81,9 +82,31 @@ impl LinearQ {
         }
     }
 
-    /// Adds `change` to one weight.
+    /// Raises the traces of (s, a), whose values are learned with step size `alpha`.
     #[inline]
-    pub(super) fn add(&mut self, feature: usize, a: Action, change: f64) {
-        *self.weights.get_mut(feature, a) += change;
+    pub(super) fn raise(&self, traces: &mut Traces, s: &Active, a: Action, alpha: f64) {
+        let mut factor = 1.0;
+        if traces.kind() == Trace::Dutch {
+            // zᵀ(αx), where each feature has its own share of α.
+            let mut product = 0.0;
+            for (&i, step) in s.index.iter().zip(&s.step) {
+                product += traces.get(self.weights.pair(i as usize, a)) * step;
+            }
+            factor = 1.0 - alpha * product;
+        }
+        for (&i, x) in s.index.iter().zip(&s.value) {
+            traces.raise(self.weights.pair(i as usize, a), factor * x);
+        }
+    }
+
+    /// Moves the weights by `size` along the traces, which then fade.
+    #[inline]
+    pub(super) fn learn_along(&mut self, traces: &mut Traces, size: f64) {
+        let Self { features, weights } = self;
+        let n_actions = weights.n_actions();
+        let values = weights.values_mut();
+        traces.spread(size, |pair, change| {
+            values[pair] += change * features.share(pair / n_actions);
+        });
     }
 }

@@ -2,7 +2,7 @@
 //! chapters 9, 10 and 12): for states too many or too fine for a table.
 //!
 //! - [`LinearQ`]: features and weights
-//! - [`LinearLearner`]: Q-learning and SARSA, with eligibility traces or without
+//! - [`LinearLearner`]: Q-learning, SARSA and expected SARSA, Q(λ) and SARSA(λ)
 //! - [`LinearSetup`]: what a learner is built for
 //!
 //! Sums over features are taken in the order in which [`Features`] lists them, so that results have
@@ -10,11 +10,9 @@
 
 mod learner;
 mod linear_q;
-mod traces;
 
 pub use learner::{LinearLearner, LinearSetup, Target};
 pub use linear_q::LinearQ;
-pub use traces::{TraceKind, Traces};
 
 #[cfg(doc)]
 use crate::shaping::Features;

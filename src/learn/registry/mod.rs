@@ -8,11 +8,12 @@ mod linear;
 mod planners;
 mod shared;
 
+pub use self::linear::BuildLinear;
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
-use super::{Learn, LinearSetup, QLearning, QTable, Sarsa};
+use super::{Learn, QLearning, QTable, Sarsa};
 use crate::mdp::streams::Stream;
-use crate::shaping::{Fields, Shielded};
+use crate::shaping::Shielded;
 
 /// What a learner is built for.
 #[derive(Debug)]
@@ -21,7 +22,9 @@ pub struct Setup {
     pub n_states: usize,
     /// Number of actions.
     pub n_actions: usize,
-    /// Its randomness.
+    /// The run's seed, for randomness that is not its behaviour's.
+    pub seed: u64,
+    /// The randomness of its behaviour.
     pub stream: Stream,
     /// Initial action values, shape `[n_states, n_actions]`, where a script gives them.
     pub initial_q: Option<Vec<f64>>,
@@ -58,7 +61,7 @@ pub struct AgentSpec {
     /// How it is built.
     pub build: Build,
     /// How it is built where values are linear in features, if it can learn such.
-    pub linear: Option<fn(&AgentConfig, LinearSetup) -> Box<dyn Learn<Fields>>>,
+    pub linear: Option<BuildLinear>,
 }
 
 /// Any agent whose states are the rows of a table, with a shield or without.
@@ -117,8 +120,19 @@ impl AnyAgent {
 }
 
 /// Every agent, in the order in which they are listed.
-pub static AGENTS: &[AgentSpec] =
-    &[control::Q_LEARNING, control::SARSA, planners::VALUE_ITERATION, planners::RANDOM_AGENT];
+pub static AGENTS: &[AgentSpec] = &[
+    control::Q_LEARNING,
+    control::SARSA,
+    control::EXPECTED_SARSA,
+    control::DOUBLE_Q_LEARNING,
+    control::N_STEP_SARSA,
+    control::SARSA_LAMBDA,
+    control::Q_LAMBDA,
+    control::DYNA_Q,
+    control::SOFT_Q_LEARNING,
+    planners::VALUE_ITERATION,
+    planners::RANDOM_AGENT,
+];
 
 /// The agent called `name`.
 pub fn find(name: &str) -> Option<&'static AgentSpec> {

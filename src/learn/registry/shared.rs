@@ -1,6 +1,6 @@
 //! Parameters that several agents have.
 
-use crate::learn::{ParamKind, ParamSpec, ParamValue, Schedule, Signature};
+use crate::learn::{Exploration, ParamKind, ParamSpec, ParamValue, Schedule, Signature};
 
 pub(super) const UNIT: ParamKind = ParamKind::Float { min: 0.0, max: 1.0, open: false };
 pub(super) const ANY: ParamKind =
@@ -12,6 +12,11 @@ pub(super) const ALPHA: ParamSpec = ParamSpec {
     function: None,
     default: ParamValue::Schedule(Schedule::Constant { value: 0.1 }),
     doc: "step size: a number or a schedule",
+};
+pub(super) const STEP_SIZE: ParamSpec = ParamSpec {
+    kind: ParamKind::StepSize,
+    doc: "step size: a number, a schedule, or visit_count() for 1/N(s, a)",
+    ..ALPHA
 };
 pub(super) const GAMMA: ParamSpec = ParamSpec {
     name: "gamma",
@@ -26,6 +31,13 @@ pub(super) const EPSILON: ParamSpec = ParamSpec {
     function: None,
     default: ParamValue::Schedule(Schedule::Constant { value: 0.1 }),
     doc: "exploration rate: a number or a schedule",
+};
+pub(super) const EXPLORATION: ParamSpec = ParamSpec {
+    name: "exploration",
+    kind: ParamKind::Exploration,
+    function: None,
+    default: ParamValue::Exploration(Exploration::EpsilonGreedy),
+    doc: "the behaviour policy; epsilon plays no part in the others",
 };
 pub(super) const INITIAL_Q: ParamSpec = ParamSpec {
     name: "initial_q",

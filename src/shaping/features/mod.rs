@@ -156,6 +156,15 @@ impl Features {
         }
     }
 
+    /// The share of a step size that `feature` gets, above 0.
+    #[inline]
+    pub fn share(&self, feature: usize) -> f64 {
+        match self {
+            Self::Tiles(tiles) => tiles.share(),
+            Self::Fourier(fourier) => fourier.share(feature),
+        }
+    }
+
     /// The weight of `feature` that gives every state the value `value`, if every feature has its
     /// own such weight.
     pub fn level(&self, feature: usize, value: f64) -> f64 {

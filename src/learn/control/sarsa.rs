@@ -4,44 +4,38 @@
 //!
 //! The book's order: A′ is chosen from S′ *before* the update, and is the action that is played.
 
-use super::tabular::Tabular;
-use super::{Agent, Last, Learn, QTable, Schedule, Seen};
+use super::Tabular;
+use super::tabular::agent_of_table;
+use crate::learn::{
+    EpsilonGreedy, Explore, Last, Learn, QTable, Rate, Schedule, ScheduleState, Seen,
+};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
-/// Tabular SARSA, ε-greedy.
+/// Tabular SARSA, on-policy; ε-greedy unless the behaviour says otherwise.
 ///
 /// Deviation 1: where an episode is truncated, the book has no rule; A′ is chosen from the last
 /// state as anywhere else, bootstrapped from, and not played.
 #[derive(Debug, Clone)]
-pub struct Sarsa(Tabular);
+pub struct Sarsa<B = EpsilonGreedy, A = ScheduleState>(Tabular<B, A>);
 
 impl Sarsa {
     /// A learner with the table `q`; exploration draws from `stream`.
     pub fn new(q: QTable, gamma: f64, alpha: Schedule, epsilon: Schedule, stream: Stream) -> Self {
-        Self(Tabular::new(q, gamma, alpha, epsilon, stream))
+        Self(Tabular::scheduled(q, gamma, alpha, epsilon, stream))
     }
 }
 
-impl Agent for Sarsa {
-    fn gamma(&self) -> f64 {
-        self.0.gamma
-    }
-
-    fn bootstraps_when_truncated(&self) -> bool {
-        true
-    }
-
-    fn epsilon(&self) -> f64 {
-        self.0.epsilon()
-    }
-
-    fn q(&self) -> Option<&QTable> {
-        Some(&self.0.q)
+impl<B: Explore, A: Rate> Sarsa<B, A> {
+    /// A learner with this table and behaviour.
+    pub fn of(table: Tabular<B, A>) -> Self {
+        Self(table)
     }
 }
 
-impl<S: Seen> Learn<S> for Sarsa {
+agent_of_table!(Sarsa<B, A>, 0, B: Explore, A: Rate);
+
+impl<S: Seen, B: Explore, A: Rate> Learn<S> for Sarsa<B, A> {
     #[inline]
     fn begin(&mut self, s: S) -> Action {
         let a = self.0.choose(s);

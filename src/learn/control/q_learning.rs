@@ -5,42 +5,35 @@
 //! The book's order: choose A from S, observe R and S′, update, and only then choose the next
 //! action, from the updated values.
 
-use super::greedy::max_allowed;
-use super::tabular::Tabular;
-use super::{Agent, Last, Learn, QTable, Schedule, Seen};
+use super::Tabular;
+use super::tabular::agent_of_table;
+use crate::learn::{
+    EpsilonGreedy, Explore, Last, Learn, QTable, Rate, Schedule, ScheduleState, Seen, max_allowed,
+};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
-/// Tabular Q-learning, ε-greedy.
+/// Tabular Q-learning, off-policy; ε-greedy unless the behaviour says otherwise.
 #[derive(Debug, Clone)]
-pub struct QLearning(Tabular);
+pub struct QLearning<B = EpsilonGreedy, A = ScheduleState>(Tabular<B, A>);
 
 impl QLearning {
     /// A learner with the table `q`; exploration draws from `stream`.
     pub fn new(q: QTable, gamma: f64, alpha: Schedule, epsilon: Schedule, stream: Stream) -> Self {
-        Self(Tabular::new(q, gamma, alpha, epsilon, stream))
+        Self(Tabular::scheduled(q, gamma, alpha, epsilon, stream))
     }
 }
 
-impl Agent for QLearning {
-    fn gamma(&self) -> f64 {
-        self.0.gamma
-    }
-
-    fn bootstraps_when_truncated(&self) -> bool {
-        true
-    }
-
-    fn epsilon(&self) -> f64 {
-        self.0.epsilon()
-    }
-
-    fn q(&self) -> Option<&QTable> {
-        Some(&self.0.q)
+impl<B: Explore, A: Rate> QLearning<B, A> {
+    /// A learner with this table and behaviour.
+    pub fn of(table: Tabular<B, A>) -> Self {
+        Self(table)
     }
 }
 
-impl<S: Seen> Learn<S> for QLearning {
+agent_of_table!(QLearning<B, A>, 0, B: Explore, A: Rate);
+
+impl<S: Seen, B: Explore, A: Rate> Learn<S> for QLearning<B, A> {
     #[inline]
     fn begin(&mut self, s: S) -> Action {
         let a = self.0.choose(s);
