@@ -11,6 +11,9 @@
 mod learner;
 mod linear_q;
 
+#[cfg(test)]
+mod tests;
+
 pub use learner::{LinearLearner, LinearSetup, Target};
 pub use linear_q::LinearQ;
 
