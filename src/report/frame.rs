@@ -212,7 +212,7 @@ fn acting(states: &[ListedState]) -> Vec<&ListedState> {
 fn telling(landscape: &Landscape, variant: &Variant) -> Vec<usize> {
     let fields = &landscape.schema.fields;
     let cut: Vec<usize> =
-        (0..fields.len()).filter(|&f| variant.discretiser.range(f).is_some()).collect();
+        (0..fields.len()).filter(|&f| variant.discretiser.dim(f).is_some()).collect();
     if !cut.is_empty() {
         return cut;
     }
@@ -346,8 +346,8 @@ impl Choice<'_> {
     fn middle(&self) -> Vec<f64> {
         let mut fields = self.landscape.middle();
         for (f, value) in fields.iter_mut().enumerate() {
-            if let Some([low, high]) = self.variant.discretiser.range(f) {
-                *value = f64::midpoint(low, high);
+            if let Some(d) = self.variant.discretiser.dim(f) {
+                *value = f64::midpoint(d.lo, d.hi);
             }
         }
         fields
@@ -366,7 +366,9 @@ impl Choice<'_> {
             return Ok((self.axis(self.field(x)?)?, self.axis(self.field(y)?)?));
         }
         let mut axes: Vec<Axis> = self.telling.iter().filter_map(|&f| self.axis(f).ok()).collect();
-        axes.sort_by_key(|axis| std::cmp::Reverse(axis.n));
+        // Of axes with as many places, those of fields that are cut most finely.
+        let parts = |field| self.variant.discretiser.dim(field).map_or(0, |d| d.n);
+        axes.sort_by_key(|axis| std::cmp::Reverse((axis.n, parts(axis.field))));
         axes.truncate(2);
         axes.sort_by_key(|axis| (axis.down, axis.n, axis.field));
         let mut axes = axes.into_iter();
@@ -392,9 +394,9 @@ impl Choice<'_> {
         // A map is drawn whole; elsewhere what no episode meets is left out.
         let own = self.values(field);
         let is_map = self.landscape.schema.grid.is_some();
-        let (low, high) = match (own.first(), own.last(), self.variant.discretiser.range(field)) {
+        let (low, high) = match (own.first(), own.last(), self.variant.discretiser.dim(field)) {
             (Some(&low), Some(&high), _) if !is_map => (low, high),
-            (_, _, Some([low, high])) if kind == FieldKind::Float => (low, high),
+            (_, _, Some(d)) if kind == FieldKind::Float => (d.lo, d.hi),
             _ => (low, high),
         };
         if !(low.is_finite() && high.is_finite()) || kind == FieldKind::Letter {

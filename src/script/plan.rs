@@ -67,14 +67,14 @@ pub enum DiscretiserSpec {
 }
 
 impl DiscretiserSpec {
-    /// The range of a field that is cut into bins or has features.
-    pub fn range(&self, field: usize) -> Option<[f64; 2]> {
+    /// The range of a field that is cut into bins or has features, and into how many.
+    pub fn dim(&self, field: usize) -> Option<&Dim> {
         let dims = match self {
             Self::Bins(dims) => dims,
             Self::Features(features) => &features.dims,
             Self::StateIndex | Self::Cells { .. } => return None,
         };
-        dims.iter().find(|d| d.field == field).map(|d| [d.lo, d.hi])
+        dims.iter().find(|d| d.field == field)
     }
 }
 
