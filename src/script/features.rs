@@ -48,7 +48,7 @@ pub(super) fn resolve(
     if weights.is_none_or(|n| n > MAX_WEIGHTS) {
         let weights = weights.map_or("too many".into(), |n| n.to_string());
         return Err(Diagnostic::error(format!(
-            "{features}, are {weights} weights for {n_actions} actions: {MAX_WEIGHTS} is the most"
+            "{features}, make {weights} weights for {n_actions} actions, more than {MAX_WEIGHTS}"
         ))
         .hint(match draft.kind {
             FeatureKind::Tiles(_) => "use fewer tiles, tilings or fields",
@@ -116,7 +116,7 @@ fn all_fields(order: usize, at: &Surroundings<'_>) -> Result<Vec<Dim>, Diagnosti
             f.name, at.spec.id
         ))
         .hint(format!(
-            "name the fields: fourier(#{{ order: {order}, {}: [-1.0, 1.0], .. }})",
+            "name the fields: fourier(#{{ order: {order}, {}: [lo, hi], .. }})",
             f.name
         )))
     });

@@ -99,7 +99,7 @@ fn fourier_of_map(call: &Call<'_>, map: &Map) -> Result<DiscretiserDraft, Diagno
 fn label(field: &Result<String, usize>) -> String {
     match field {
         Ok(name) => format!("`{name}`"),
-        Err(i) => format!("number {}", i + 1),
+        Err(i) => format!("range number {}", i + 1),
     }
 }
 

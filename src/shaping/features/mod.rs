@@ -57,7 +57,12 @@ impl std::fmt::Display for FeatureSpec {
                 let plural = if tilings == 1 { "" } else { "s" };
                 write!(f, "{tilings} tiling{plural} of {} tiles", sizes.join(" × "))?;
             }
-            FeatureKind::Fourier => write!(f, "Fourier basis of order {}", sizes.join(" × "))?,
+            // One order for all.
+            FeatureKind::Fourier => {
+                let (order, n) = (sizes.first().map_or("0", String::as_str), sizes.len());
+                let plural = if n == 1 { "" } else { "s" };
+                write!(f, "Fourier basis of order {order} over {n} field{plural}")?;
+            }
         }
         write!(f, ", {} features", self.n_features().unwrap_or(usize::MAX))
     }
