@@ -4,6 +4,7 @@
 //! 1 it ran, but an expectation, a golden file or a parity check failed; 2 bad input or usage;
 //! 75 stopped, can be resumed.
 
+mod audit;
 mod check;
 mod completions;
 mod exec;
@@ -39,6 +40,8 @@ enum Command {
     Exec(exec::Args),
     /// Compile scripts, call every callback on sampled states, print the plan
     Check(check::Args),
+    /// Say of each shaping whether it keeps the optimal policy: the proof, or what goes wrong
+    Audit(audit::Args),
     /// List environments, agents, functions, keys or examples
     List(list::Args),
     /// Play actions in an environment and print what happens
@@ -147,6 +150,7 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.command {
         Command::Exec(args) => exec::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Audit(args) => audit::run(&args),
         Command::List(args) => list::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Show(args) => show::run(&args),

@@ -10,7 +10,7 @@ use super::assemble::middle;
 use super::audit::{Audit, audit_variant};
 use super::hex;
 use super::landscape::features;
-use super::record::UnitRecord;
+use super::record::{StateValues, UnitRecord};
 use super::unit::{UnitError, run_unit};
 use crate::env::EnvVisitor;
 use crate::learn::{LinearQ, QTable, greedy_sets};
@@ -56,7 +56,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
     if let DiscretiserSpec::Features(features) = &variant.discretiser {
         writeln!(out, "  features {features}").expect(MEMORY);
     }
-    let audit = audit_variant(host, variant)?;
+    let audit = audit_variant(host, variant, None)?;
     exact(&audit, out);
     let look = look(variant)?;
     for (i, &seed) in variant.seeds.0.iter().enumerate() {
@@ -69,6 +69,9 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         returns(variant, &record, out);
         if let (Some(weights), Some(features)) = (&record.weights, features(variant)) {
             linear(&LinearQ::from_weights(features, weights.clone()), variant, &look, i == 0, out);
+        }
+        if let Some(values) = &record.values {
+            state_values(&record, values, out);
         }
         if let Some(q) = &record.q {
             let sets = greedy_sets(q);
@@ -86,7 +89,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
 
 fn exact(audit: &Audit, out: &mut String) {
     writeln!(out, "  shaping {}: {}", audit.label(), audit.basis).expect(MEMORY);
-    if let Some(exact) = &audit.exact {
+    if let Some(exact) = audit.preservation() {
         let holds = if exact.identity_holds() { "holds" } else { "does not hold" };
         writeln!(
             out,
@@ -109,6 +112,17 @@ fn returns(variant: &Variant, record: &UnitRecord, out: &mut String) {
     });
     writeln!(out, "    return {}", points.join(", ")).expect(MEMORY);
     writeln!(out, "    steps {}", record.steps()).expect(MEMORY);
+}
+
+/// What a predictor learned: its error, where it is known, and a digest of the values.
+fn state_values(record: &UnitRecord, values: &StateValues, out: &mut String) {
+    if let Some(error) = record.rows.last().and_then(|row| row.value_error) {
+        writeln!(out, "    value error {error:.6}").expect(MEMORY);
+    }
+    let mut hash = Sha256::new();
+    values.v.iter().for_each(|v| hash.update(v.to_bits().to_le_bytes()));
+    let digest = hex(&hash.finalize()[..8]);
+    writeln!(out, "    values {digest} of {} states", values.v.len()).expect(MEMORY);
 }
 
 /// Pins every set without listing them all.

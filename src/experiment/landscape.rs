@@ -2,6 +2,7 @@
 //! in, and to Φ there. Serves pictures and play, which are outside of training.
 
 use super::assemble::{diagnostic_of, middle};
+use super::shaped;
 use crate::env::{EnvVisitor, Session};
 use crate::learn::{LinearQ, QTable};
 use crate::mdp::{Env, MAX_FIELDS, Schema};
@@ -44,7 +45,7 @@ impl Locate {
 }
 
 /// Action values as they were learned, to be asked of a session's present state.
-pub(super) enum Values {
+pub(super) enum Lookup {
     /// A table.
     Table(Locate, QTable),
     /// Features and weights.
@@ -58,7 +59,7 @@ pub(super) enum Values {
     },
 }
 
-impl Values {
+impl Lookup {
     /// Those of `variant`, whose table or weights `q` holds.
     pub(super) fn new(host: &Host, variant: &Variant, schema: &Schema, q: QTable) -> Self {
         match Locate::new(host, variant, schema) {
@@ -118,6 +119,8 @@ pub struct Landscape {
     pub features: Option<Features>,
     locate: Option<Locate>,
     phi: Option<PhiFn>,
+    /// In which episode Φ is taken.
+    last_episode: u32,
     /// Whether Φ is taken at the cell's representative, as in training.
     on_cell: bool,
 }
@@ -133,7 +136,7 @@ impl Landscape {
         let schema = env.schema();
         let by_index = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
         let locate = Locate::new(host, variant, &schema);
-        let phi = variant.potential.as_ref().map(|phi| host.callbacks().potential(phi, &schema));
+        let phi = shaped::phi(host, variant, &schema);
         Ok(Self {
             states: by_index.then(|| env.visit(ListStates)),
             on_cell: matches!(locate, Some(Locate::Bins(_))) && variant.potential_on == PhiOn::Cell,
@@ -141,6 +144,7 @@ impl Landscape {
             features: features(variant),
             locate,
             phi,
+            last_episode: variant.episodes,
         })
     }
 
@@ -162,7 +166,8 @@ impl Landscape {
         }
     }
 
-    /// Φ as the learner meets it in a state of `cell` with these fields; `None` without one.
+    /// Φ as the learner meets it, at the end of training, in a state of `cell` with these fields;
+    /// `None` without one. What the learner's own values add to it is not in it.
     ///
     /// # Errors
     /// If the callback fails.
@@ -177,7 +182,7 @@ impl Landscape {
             }
             _ => state[..n_fields].copy_from_slice(fields),
         }
-        phi(&state[..n_fields]).map(Some).map_err(diagnostic_of)
+        phi(&state[..n_fields], self.last_episode).map(Some).map_err(diagnostic_of)
     }
 }
 

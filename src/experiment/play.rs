@@ -6,7 +6,7 @@
 //! action is played, which is what greedy choice did in training too. An action is repeated for as
 //! many steps as the variant's `frame_skip` says.
 
-use super::landscape::{Locate, Values};
+use super::landscape::{Locate, Lookup};
 use crate::env::rollout::{Event, Length, RolloutError, drive};
 use crate::env::{EnvError, PlayedAction, Session};
 use crate::learn::{LinearQ, QTable, argmax_allowed};
@@ -17,7 +17,7 @@ use crate::shaping::{ActionSet, Fault, ShieldFn, Shielded};
 
 /// A greedy policy.
 pub struct Policy {
-    values: Values,
+    values: Lookup,
     shield: Option<ShieldFn>,
     /// For how many steps an action is played.
     frame_skip: u32,
@@ -33,19 +33,19 @@ impl Policy {
             .allowed
             .as_ref()
             .map(|allowed| host.callbacks().shield(allowed, q.n_actions(), session.schema()));
-        let values = Values::new(host, variant, session.schema(), q);
+        let values = Lookup::new(host, variant, session.schema(), q);
         Self { values, shield, frame_skip: variant.frame_skip, held: 0 }
     }
 
     /// The policy of a table that has one row per state of a finite environment.
     pub fn of_states(q: QTable) -> Self {
-        let values = Values::Table(Locate::Index, q);
+        let values = Lookup::Table(Locate::Index, q);
         Self { values, shield: None, frame_skip: 1, held: 0 }
     }
 
     /// The policy of values that are linear in features; an action is played for `frame_skip` steps.
     pub fn of_weights(q: LinearQ, frame_skip: u32) -> Self {
-        Self { values: Values::linear(q), shield: None, frame_skip, held: 0 }
+        Self { values: Lookup::linear(q), shield: None, frame_skip, held: 0 }
     }
 
     /// The action for the session's present state.

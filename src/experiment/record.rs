@@ -13,7 +13,7 @@ pub struct EpisodeRow {
     pub native: f64,
     /// Learned return: the undiscounted sum of what the agent learned from.
     pub learned: f64,
-    /// The potential's part of the learned return.
+    /// The part of the learned return that potentials and advice make up.
     pub shaping: f64,
     /// Each extra term's part of the learned return, in the order of their names.
     pub terms: Vec<f64>,
@@ -21,6 +21,10 @@ pub struct EpisodeRow {
     pub epsilon: f64,
     /// How it ended.
     pub ending: Ending,
+    /// The error of the values of a predictor after it: root mean square over the states that its
+    /// policy reaches. `None` for other agents, without a model, and in between where many episodes
+    /// make it costly.
+    pub value_error: Option<f64>,
 }
 
 /// Everything one unit produced.
@@ -33,17 +37,55 @@ pub struct UnitRecord {
     /// The weights learned, shape `[n_features, n_actions]`, if the agent's values are linear in
     /// features.
     pub weights: Option<QTable>,
+    /// The state values learned, if they are what the agent learns.
+    pub values: Option<StateValues>,
     /// A planner's largest change per sweep; empty for learners.
     pub sweeps: Vec<f64>,
 }
 
-/// Action values read back from a store: a row per state, or where values are linear in features a
-/// row of weights per feature.
+/// State values with what they should be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateValues {
+    /// Those learned, one per state.
+    pub v: Vec<f64>,
+    /// The exact ones, `None` in states that the policy does not reach; empty without a model.
+    pub exact: Vec<Option<f64>>,
+}
+
+/// What an agent learns of states.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Action values.
+    Q(QTable),
+    /// State values of a policy that was given, one per state.
+    V(Vec<f64>),
+}
+
+impl Values {
+    /// The value of a state: of the best action, or of the policy.
+    pub fn of(&self, s: usize) -> f64 {
+        match self {
+            Self::Q(q) => q.max(s),
+            Self::V(v) => v[s],
+        }
+    }
+
+    /// The action values, if that is what they are.
+    pub fn q(&self) -> Option<&QTable> {
+        match self {
+            Self::Q(q) => Some(q),
+            Self::V(_) => None,
+        }
+    }
+}
+
+/// What was learned, read back from a store: of states, or where values are linear in features, of
+/// these: their weights then stand in for action values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
-    /// The rows; the agent's initial ones where nothing was learned.
-    pub q: QTable,
-    /// Whether anything was learned, one flag per row.
+    /// The values; the agent's initial one where nothing was learned.
+    pub values: Values,
+    /// Whether anything was learned in a state (or of a feature), one flag each.
     pub experienced: Vec<bool>,
 }
 
@@ -52,14 +94,15 @@ impl Learned {
     /// was of one of the state's features.
     #[must_use]
     pub fn at(self, features: &Features, states: &[Vec<f64>]) -> Self {
+        let Self { values: Values::Q(weights), experienced } = self else { return self };
         let mut active = features.active();
         let mut known = |state: &Vec<f64>| {
             features.see(state, &mut active);
-            active.index.iter().any(|&i| self.experienced[i as usize])
+            active.index.iter().any(|&i| experienced[i as usize])
         };
         let experienced = states.iter().map(&mut known).collect();
-        let q = LinearQ::from_weights(features.clone(), self.q).table(states);
-        Self { q, experienced }
+        let q = LinearQ::from_weights(features.clone(), weights).table(states);
+        Self { values: Values::Q(q), experienced }
     }
 }
 

@@ -4,9 +4,11 @@ use std::sync::atomic::AtomicBool;
 
 use sha2::{Digest, Sha256};
 
-use super::record::{EpisodeRow, UnitRecord};
+use super::assemble::Assembled;
+use super::predict::Exact;
+use super::record::{EpisodeRow, StateValues, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
-use super::{assemble, hex};
+use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
 use crate::learn::{AnyAgent, Learn};
@@ -21,7 +23,11 @@ use crate::shaping::{
 
 /// Raised whenever the same configuration gives other results than before: old units are then not
 /// taken for new ones.
-pub const SEMANTICS: u32 = 1;
+pub const SEMANTICS: u32 = 2;
+
+/// Whether the commonest combinations get loops of their own. Not when debugging: they are most of
+/// what there is to compile, and the shared loop gives the same results.
+const OWN_LOOPS: bool = !cfg!(debug_assertions);
 
 /// A unit of work.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -128,14 +134,14 @@ impl EnvVisitor for RunUnit<'_> {
         let cells = match &variant.discretiser {
             DiscretiserSpec::StateIndex => {
                 let index = StateIndex { n_states: env.n_states().unwrap_or(0) };
-                if const { E::INDEXED } && shield.is_none() {
+                if const { OWN_LOOPS && E::INDEXED } && shield.is_none() {
                     return self.fast(env, index);
                 }
                 AnyCells::Index(index)
             }
             DiscretiserSpec::Bins(dims) => {
                 let bins = Bins::new(dims).expect("checked when the plan was resolved");
-                if const { !E::INDEXED } && shield.is_none() {
+                if const { OWN_LOOPS && !E::INDEXED } && shield.is_none() {
                     return self.fast(env, bins);
                 }
                 AnyCells::Bins(bins)
@@ -160,7 +166,14 @@ struct Parts<E: Env> {
     potential: AnyPotential,
     reward: AnyReward<E>,
     agent: AnyAgent,
+    /// What else the unit leaves behind.
+    extra: Extra,
+}
+
+/// What a unit knows about its agent beyond what it learns.
+struct Extra {
     sweeps: Vec<f64>,
+    exact: Option<Exact>,
 }
 
 impl RunUnit<'_> {
@@ -171,10 +184,11 @@ impl RunUnit<'_> {
     ) -> Result<Parts<E>, UnitError> {
         let (host, variant, seed) = (self.host, self.variant, self.seed);
         let fault = |f| UnitError::fault(variant, seed, f);
-        let potential = assemble::potential(host, variant, env, n_cells).map_err(fault)?;
+        let potential = shaped::potential(host, variant, env, n_cells).map_err(fault)?;
         let reward = assemble::reward(host, variant, env).map_err(fault)?;
-        let (agent, sweeps) = assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;
-        Ok(Parts { potential, reward, agent, sweeps })
+        let Assembled { agent, sweeps, exact } =
+            assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;
+        Ok(Parts { potential, reward, agent, extra: Extra { sweeps, exact } })
     }
 
     /// The commonest agents have loops of their own, for plain and potential-only rewards and for
@@ -184,12 +198,12 @@ impl RunUnit<'_> {
         E: Env + Clone + 'static,
         D: Discretiser<E, State = usize>,
     {
-        let Parts { potential, reward, agent, sweeps } = self.parts(&env, discretiser.n_cells())?;
+        let Parts { potential, reward, agent, extra } = self.parts(&env, discretiser.n_cells())?;
         if !agent.is_fast() {
             let world = World { env, discretiser, potential, reward };
-            return self.train(world, agent.boxed(), sweeps);
+            return self.train(world, agent.boxed(), extra);
         }
-        let unit = (self, sweeps);
+        let unit = (self, extra);
         match (potential, reward) {
             (AnyPotential::No(_), AnyReward::Native(_)) => {
                 let (potential, reward) = (NoPotential, NativeReward);
@@ -211,8 +225,8 @@ impl RunUnit<'_> {
         D: Discretiser<E>,
         Box<dyn TabularAgent>: Learn<D::State>,
     {
-        let Parts { potential, reward, agent, sweeps } = self.parts(&env, discretiser.n_cells())?;
-        self.train(World { env, discretiser, potential, reward }, agent.boxed(), sweeps)
+        let Parts { potential, reward, agent, extra } = self.parts(&env, discretiser.n_cells())?;
+        self.train(World { env, discretiser, potential, reward }, agent.boxed(), extra)
     }
 
     /// One loop for every agent on linear values, potential and reward.
@@ -224,18 +238,19 @@ impl RunUnit<'_> {
     ) -> Result<UnitRecord, UnitError> {
         let (host, variant, seed) = (self.host, self.variant, self.seed);
         let fault = |f| UnitError::fault(variant, seed, f);
-        let potential = assemble::potential(host, variant, &env, 0).map_err(fault)?;
+        let potential = shaped::potential(host, variant, &env, 1).map_err(fault)?;
         let reward = assemble::reward(host, variant, &env).map_err(fault)?;
         let agent = assemble::linear_agent(variant, features, &env, seed);
         let discretiser = RawFields { shield };
-        self.train(World { env, discretiser, potential, reward }, agent, Vec::new())
+        let extra = Extra { sweeps: Vec::new(), exact: None };
+        self.train(World { env, discretiser, potential, reward }, agent, extra)
     }
 
     fn train<E, D, P, R, A>(
         self,
         mut world: World<E, D, P, R>,
         mut agent: A,
-        sweeps: Vec<f64>,
+        extra: Extra,
     ) -> Result<UnitRecord, UnitError>
     where
         E: Env,
@@ -251,21 +266,34 @@ impl RunUnit<'_> {
             n_terms: variant.terms.len(),
             frame_skip: variant.frame_skip,
             clip_reward: variant.clip_reward,
+            exploring_starts: variant.agent.is_on("exploring_starts").then_some(seed),
         };
+        let Extra { sweeps, exact } = extra;
+        let spacing = exact.as_ref().map_or(0, |exact| exact.spacing(limits.episodes));
         let mut rng = NumpyRng::from_u64(seed);
         let mut rows: Vec<EpisodeRow> = Vec::with_capacity(limits.episodes as usize);
-        train(&mut world, &mut agent, limits, &mut rng, stop, |row, _| {
+        train(&mut world, &mut agent, limits, &mut rng, stop, |mut row, agent| {
             each(row.steps);
+            if let (Some(exact), Some(v)) = (&exact, agent.v()) {
+                let episode = rows.len() as u32;
+                let due = episode % spacing == 0 || episode + 1 == limits.episodes;
+                row.value_error = due.then(|| exact.error(v));
+            }
             rows.push(row);
         })
         .map_err(|e| UnitError::train(variant, seed, e))?;
         let weights = agent.weights().cloned();
-        Ok(UnitRecord { rows, q: agent.q().cloned(), weights, sweeps })
+        let q = agent.q().cloned();
+        let values = agent.v().filter(|_| q.is_none()).map(|v| StateValues {
+            v: v.to_vec(),
+            exact: exact.map_or_else(Vec::new, |exact| exact.v),
+        });
+        Ok(UnitRecord { rows, q, weights, values, sweeps })
     }
 }
 
 struct Train<'a, E, D, P, R> {
-    unit: (RunUnit<'a>, Vec<f64>),
+    unit: (RunUnit<'a>, Extra),
     world: World<E, D, P, R>,
 }
 
@@ -279,7 +307,7 @@ where
     type Out = Result<UnitRecord, UnitError>;
 
     fn visit<A: Learn<usize>>(self, agent: A) -> Self::Out {
-        let (unit, sweeps) = self.unit;
-        unit.train(self.world, agent, sweeps)
+        let (unit, extra) = self.unit;
+        unit.train(self.world, agent, extra)
     }
 }

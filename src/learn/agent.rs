@@ -38,6 +38,13 @@ pub trait Agent {
     fn v(&self) -> Option<&[f64]> {
         None
     }
+
+    /// What the agent itself added to its rewards, summed over the episode that has ended: the
+    /// part of a shaping that needs to know which action is bootstrapped from, or what has been
+    /// learned so far.
+    fn shaping(&self) -> f64 {
+        0.0
+    }
 }
 
 /// Playing and learning, over states of type `S`.
@@ -82,6 +89,10 @@ impl<T: Agent + ?Sized> Agent for Box<T> {
 
     fn v(&self) -> Option<&[f64]> {
         (**self).v()
+    }
+
+    fn shaping(&self) -> f64 {
+        (**self).shaping()
     }
 }
 

@@ -22,8 +22,14 @@ pub trait Explore {
     /// Action `a` is what is played in row `s`.
     fn played(&mut self, _s: usize, _a: Action) {}
 
-    /// `Σ_a π(a | s) Q(s, a)`, π being what [`Self::choose`] would do now.
-    fn expected<S: Seen>(&mut self, q: &[f64], s: S) -> f64;
+    /// `Σ_a π(a | s) x(a)`, π being what [`Self::choose`] would do now.
+    fn mean<S: Seen>(&mut self, q: &[f64], s: S, x: &[f64]) -> f64;
+
+    /// `Σ_a π(a | s) Q(s, a)`.
+    #[inline]
+    fn expected<S: Seen>(&mut self, q: &[f64], s: S) -> f64 {
+        self.mean(q, s, q)
+    }
 
     /// ε at present; 0 where there is none.
     fn epsilon(&self) -> f64;
@@ -94,16 +100,16 @@ impl Explore for EpsilonGreedy {
     }
 
     #[inline]
-    fn expected<S: Seen>(&mut self, q: &[f64], s: S) -> f64 {
+    fn mean<S: Seen>(&mut self, q: &[f64], s: S, x: &[f64]) -> f64 {
         let (mut sum, mut n) = (0.0, 0u32);
-        for (a, &value) in q.iter().enumerate() {
+        for (a, &value) in x.iter().enumerate() {
             if s.allows(a) {
                 sum += value;
                 n += 1;
             }
         }
         let epsilon = self.epsilon.value();
-        epsilon * (sum / f64::from(n)) + (1.0 - epsilon) * q[argmax_allowed(q, s)]
+        epsilon * (sum / f64::from(n)) + (1.0 - epsilon) * x[argmax_allowed(q, s)]
     }
 
     fn epsilon(&self) -> f64 {
@@ -163,11 +169,11 @@ impl Explore for Behaviour {
     }
 
     #[inline]
-    fn expected<S: Seen>(&mut self, q: &[f64], s: S) -> f64 {
+    fn mean<S: Seen>(&mut self, q: &[f64], s: S, x: &[f64]) -> f64 {
         match self {
-            Self::EpsilonGreedy(policy) => policy.expected(q, s),
-            Self::Softmax(policy) => policy.expected(q, s),
-            Self::Ucb(policy) => policy.expected(q, s),
+            Self::EpsilonGreedy(policy) => policy.mean(q, s, x),
+            Self::Softmax(policy) => policy.mean(q, s, x),
+            Self::Ucb(policy) => policy.mean(q, s, x),
         }
     }
 

@@ -72,11 +72,13 @@ impl Explore for Softmax {
     }
 
     #[inline]
-    fn expected<S: Seen>(&mut self, q: &[f64], s: S) -> f64 {
-        let (best, sum) = self.weigh(q, s);
+    fn mean<S: Seen>(&mut self, q: &[f64], s: S, x: &[f64]) -> f64 {
+        let (_, sum) = self.weigh(q, s);
         // From the differences, so that a value of 10⁹ costs the small ones nothing.
-        let weighted = self.weights.iter().zip(q).filter(|(weight, _)| **weight > 0.0);
-        best + weighted.map(|(weight, value)| weight * (value - best)).sum::<f64>() / sum
+        let best = self.weights.iter().zip(x).find(|(weight, _)| **weight == 1.0);
+        let best = best.map_or(0.0, |(_, x)| *x);
+        let weighted = self.weights.iter().zip(x).filter(|(weight, _)| **weight > 0.0);
+        best + weighted.map(|(weight, x)| weight * (x - best)).sum::<f64>() / sum
     }
 
     fn epsilon(&self) -> f64 {

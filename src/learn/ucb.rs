@@ -60,8 +60,8 @@ impl Explore for Ucb {
     }
 
     #[inline]
-    fn expected<S: Seen>(&mut self, q: &[f64], s: S) -> f64 {
-        q[self.choose(q, s)]
+    fn mean<S: Seen>(&mut self, q: &[f64], s: S, x: &[f64]) -> f64 {
+        x[self.choose(q, s)]
     }
 
     fn epsilon(&self) -> f64 {

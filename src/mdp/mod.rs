@@ -9,11 +9,14 @@
 
 mod env;
 mod finite;
+mod finite_env;
 pub mod math;
 pub mod numpy;
 pub mod streams;
 
 pub use env::{
-    Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, widen,
+    Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, angle,
+    widen, within,
 };
-pub use finite::{FiniteEnv, FiniteMdp, FiniteMdpError, FiniteState, Outcome};
+pub use finite::{FiniteMdp, FiniteMdpError, Outcome};
+pub use finite_env::{FiniteEnv, FiniteState};

@@ -10,8 +10,9 @@ use super::diagnostic::{Diagnostic, Place, suggest};
 use super::features::FeaturesDraft;
 use super::keys;
 use super::params::{merge_agent, number, show, text, whole};
-use super::plan::{GoldenBudget, PhiOn};
+use super::plan::GoldenBudget;
 use super::setting::{Entries, SettingDraft};
+use super::shaping::ShapingDraft;
 use super::value::MAX_DEPTH;
 use crate::learn::ParamValue;
 use crate::learn::registry::AgentSpec;
@@ -93,8 +94,7 @@ pub(super) struct ExperimentDraft {
     pub(super) threshold: Option<f64>,
     pub(super) window: Option<u32>,
     pub(super) setting: SettingDraft,
-    pub(super) potential: Option<Located<FnPtr>>,
-    pub(super) potential_on: Option<Located<PhiOn>>,
+    pub(super) shaping: ShapingDraft,
     pub(super) reward: Option<Located<FnPtr>>,
     pub(super) terms: BTreeMap<String, Located<FnPtr>>,
     pub(super) allowed: Option<Located<FnPtr>>,
@@ -117,7 +117,7 @@ pub(super) fn wrong(key: &str, expected: &str, value: &Dynamic) -> Diagnostic {
     Diagnostic::error(format!("`{key}` is {expected}, got {}", show(value)))
 }
 
-fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagnostic> {
+pub(super) fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagnostic> {
     value
         .clone()
         .flatten()
@@ -209,16 +209,6 @@ impl ExperimentDraft {
                 let finite = number(value).filter(|x| x.is_finite());
                 self.threshold = Some(finite.ok_or_else(|| wrong(key, "a finite number", value))?);
             }
-            "potential" if removed => self.potential = None,
-            "potential" => self.potential = Some(located(function(key, "(s) -> number", value)?)),
-            "potential_on" => {
-                let on = match text(value).as_deref() {
-                    Some("cell") => PhiOn::Cell,
-                    Some("raw") => PhiOn::Raw,
-                    _ => return Err(wrong(key, "\"cell\" or \"raw\"", value)),
-                };
-                self.potential_on = Some(Located { value: on, spot: spot(key) });
-            }
             "reward" if removed => self.reward = None,
             "reward" => self.reward = Some(located(function(key, "(t) -> number", value)?)),
             "allowed" if removed => self.allowed = None,
@@ -229,6 +219,7 @@ impl ExperimentDraft {
                 self.notes = Some(text(value).ok_or_else(|| wrong(key, "a string", value))?);
             }
             key if SettingDraft::knows(key) => self.setting.set(key, value, spot)?,
+            key if ShapingDraft::knows(key) => self.shaping.set(key, value, spot(key))?,
             unknown => {
                 return Err(Diagnostic::error(format!("an experiment has no key `{unknown}`"))
                     .maybe_hint(suggest(unknown, keys::names())));
@@ -307,7 +298,8 @@ impl ExperimentDraft {
 }
 
 /// Columns of `episodes.csv` that no term may take.
-const TAKEN_COLUMNS: [&str; 9] = [
+const TAKEN_COLUMNS: [&str; 10] = [
+    "value_error",
     "variant",
     "seed",
     "episode",

@@ -115,10 +115,7 @@ fn all_fields(order: usize, at: &Surroundings<'_>) -> Result<Vec<Dim>, Diagnosti
             "`{}` of {} goes from {lo} to {hi}: the Fourier basis needs a finite range",
             f.name, at.spec.id
         ))
-        .hint(format!(
-            "name the fields: fourier(#{{ order: {order}, {}: [lo, hi], .. }})",
-            f.name
-        )))
+        .hint(format!("name the fields: fourier(#{{ order: {order}, {}: [lo, hi], .. }})", f.name)))
     });
     ranges.collect()
 }

@@ -14,8 +14,11 @@ use super::source::{hex, tokens};
 use super::value::Value;
 use crate::learn::Signature;
 
-/// A function of a state.
-pub(super) const OF_STATE: Signature = Signature { text: "(s) -> number", arities: &[1] };
+/// A potential.
+pub(super) const POTENTIAL: Signature =
+    Signature { text: "(s) -> number or (s, episode) -> number", arities: &[1, 2] };
+/// Advice on actions.
+pub(super) const ADVICE: Signature = Signature { text: "(s, a) -> number", arities: &[2] };
 /// A function of a step.
 pub(super) const OF_STEP: Signature = Signature { text: "(t) -> number", arities: &[1] };
 

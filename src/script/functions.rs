@@ -56,6 +56,11 @@ const BUILDERS: &[(&str, &str, &str)] = &[
         "fourier(order) or fourier(#{ order: 3, field: [lo, hi], .. })",
         "the Fourier basis for linear values, over all fields or those that are named",
     ),
+    (
+        "learned",
+        "learned(eta)",
+        "a potential of eta times the learner's own state values, eta · max Q(s, a)",
+    ),
     ("constant", "constant(value)", "a schedule that does not change"),
     (
         "linear",

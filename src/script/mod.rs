@@ -26,6 +26,7 @@ mod record;
 mod resolve;
 mod sandbox;
 mod setting;
+mod shaping;
 mod source;
 mod state;
 mod syntax;
@@ -39,5 +40,6 @@ pub use host::{Host, load};
 pub use plan::{
     Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, Variant,
 };
+pub use shaping::{AdviceOn, Shaping};
 pub use source::{Source, SourceSet};
 pub use value::Value;

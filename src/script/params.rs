@@ -43,6 +43,7 @@ pub(super) fn show(value: &Dynamic) -> String {
         "EnvDraft" => "an environment".into(),
         "DiscretiserDraft" => "a discretiser".into(),
         "StudyDraft" => "a study".into(),
+        "LearnedPotential" => "a learned potential".into(),
         other => format!("a value of type {}", type_name(other)),
     }
 }
@@ -153,6 +154,9 @@ fn raw(value: &Dynamic, kind: ParamKind) -> ParamValue {
     }
     if let Ok(x) = flat.as_float() {
         return ParamValue::Float(x);
+    }
+    if let Ok(yes) = flat.as_bool() {
+        return ParamValue::Bool(yes);
     }
     if let (Some(word), ParamKind::Word(words)) = (text(&flat), kind) {
         let known = words.iter().find(|known| **known == word);

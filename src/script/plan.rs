@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value as Json};
 
 use super::diagnostic::{Diagnostic, Place};
+use super::shaping::Shaping;
 use super::source::SourceSet;
 use super::value::Value;
 use crate::env::{AnyEnv, EnvConfig, EnvError, EnvSpec};
@@ -116,10 +117,12 @@ pub struct Variant {
     pub threshold: Option<f64>,
     /// Window of the rolling mean, in episodes.
     pub window: u32,
-    /// Φ(s).
+    /// Φ(s), or Φ(s, episode) if it takes two arguments.
     pub potential: Option<Callback>,
     /// On what Φ is evaluated.
     pub potential_on: PhiOn,
+    /// What else shapes the reward.
+    pub shaping: Shaping,
     /// Replaces the learned reward.
     pub reward: Option<Callback>,
     /// Extra reward terms by name.
@@ -171,7 +174,17 @@ impl Variant {
         lines
     }
 
-    /// Whether the agent learns from anything but the native reward and a potential.
+    /// Whether a potential or advice shapes the reward.
+    pub fn is_shaped(&self) -> bool {
+        self.potential.is_some() || self.shaping.is_active()
+    }
+
+    /// Whether Φ changes from episode to episode.
+    pub fn is_dynamic(&self) -> bool {
+        self.potential.as_ref().is_some_and(|phi| phi.arity == 2)
+    }
+
+    /// Whether the agent learns from anything but the native reward, a potential and advice.
     pub fn changes_reward(&self) -> bool {
         self.reward.is_some() || !self.terms.is_empty() || self.clip_reward.is_some()
     }
@@ -217,6 +230,7 @@ impl Variant {
             "max_steps": self.max_steps,
             "potential": self.potential.as_ref().map(digest),
             "potential_on": self.potential.is_some().then_some(self.potential_on),
+            "shaping": self.shaping.identity(),
             "reward": self.reward.as_ref().map(digest),
             "terms": terms,
             "agent_functions": functions,

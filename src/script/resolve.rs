@@ -10,12 +10,12 @@ use super::callback::Callbacks;
 use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
 use super::features::{self, Surroundings};
-use super::freeze::{ALLOWED, OF_STATE, OF_STEP};
-use super::plan::{Callback, DiscretiserSpec, Expectation, PhiOn, Plan, SeedList, Variant};
+use super::freeze::{ALLOWED, OF_STEP};
+use super::plan::{Callback, DiscretiserSpec, Expectation, Plan, SeedList, Variant};
 use super::value::Value;
 use super::world::{clipping_warning, dims, example_bins, physical_bins};
 use crate::env::{AnyEnv, EnvSpec};
-use crate::learn::{AgentConfig, Signature};
+use crate::learn::{AgentConfig, ParamValue, Signature};
 use crate::shaping::{ActionSet, Dim, Scale};
 
 const EPISODES: u32 = 500;
@@ -120,40 +120,9 @@ impl Resolver<'_> {
                 warnings.push(warning);
             }
         }
-        let potential = self.optional(draft.potential.as_ref(), OF_STATE)?;
-        let potential_on = potential_on(draft, &discretiser)?;
-        if potential.is_some()
-            && potential_on == PhiOn::Raw
-            && matches!(discretiser, DiscretiserSpec::Bins(_) | DiscretiserSpec::Cells { .. })
-        {
-            let hint = match discretiser {
-                DiscretiserSpec::Bins(_) => {
-                    "leave out `potential_on: \"raw\"` to evaluate it on each cell's representative"
-                }
-                _ => "bins(..) have a representative to evaluate it on, scripted cells do not",
-            };
-            let warning = Diagnostic::warning(
-                "a potential of the raw state is not constant on the discretiser's cells",
-            )
-            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
-            .note("the greedy policy of the discretised problem may change")
-            .hint(hint);
-            // Variants that inherit their potential say it once.
-            if !warnings.contains(&warning) {
-                warnings.push(warning);
-            }
-        }
-        if potential.is_some()
-            && potential_on == PhiOn::Cell
-            && matches!(discretiser, DiscretiserSpec::Cells { .. })
-        {
-            return Err(Diagnostic::error(
-                "scripted cells have no representative to evaluate the potential on",
-            )
-            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
-            .hint("use bins(..), or say `potential_on: \"raw\"`"));
-        }
+        let shaped = self.shaping(&draft.shaping, &agent.value, &discretiser, warnings)?;
         let allowed = self.allowed(draft, &any, spec)?;
+        use_of_model(draft, &agent, spec, &any, &discretiser)?;
         let mut agent_functions = BTreeMap::new();
         if let Some(drafted) = &draft.agent {
             for (name, f) in &drafted.value.functions {
@@ -183,8 +152,9 @@ impl Resolver<'_> {
             max_steps: draft.max_steps.or(spec.max_steps).filter(|&n| n > 0),
             threshold: draft.threshold.or(spec.reward_threshold),
             window: draft.window.unwrap_or(WINDOW),
-            potential,
-            potential_on,
+            potential: shaped.potential,
+            potential_on: shaped.potential_on,
+            shaping: shaped.shaping,
             reward: self.optional(draft.reward.as_ref(), OF_STEP)?,
             terms,
             allowed,
@@ -305,19 +275,52 @@ impl Resolver<'_> {
     }
 }
 
-/// On what the potential is evaluated: features have no cells.
-fn potential_on(
+/// Refuses parameters of learners that need a finite model where there is none to use.
+fn use_of_model(
     draft: &ExperimentDraft,
+    agent: &Located<AgentConfig>,
+    spec: &EnvSpec,
+    env: &AnyEnv,
     discretiser: &DiscretiserSpec,
-) -> Result<PhiOn, Diagnostic> {
-    let asked = draft.potential_on.as_ref();
-    match (discretiser, asked.map(|on| on.value)) {
-        (DiscretiserSpec::Features(_), Some(PhiOn::Cell)) => {
-            Err(Diagnostic::error("features have no cells to evaluate the potential on")
-                .at(asked.and_then(|on| on.spot.place()))
-                .hint("leave out `potential_on`: it is evaluated on the state itself"))
-        }
-        (DiscretiserSpec::Features(_), _) => Ok(PhiOn::Raw),
-        (_, on) => Ok(on.unwrap_or(PhiOn::Cell)),
+) -> Result<(), Diagnostic> {
+    let (name, id) = (agent.value.spec.name, spec.id);
+    let refuse = |message: String, hint: &str| {
+        Err(Diagnostic::error(message).at(agent.spot.place()).hint(hint))
+    };
+    let has_model = env.finite().is_some();
+    if agent.value.is_on("exploring_starts") && !has_model {
+        return refuse(
+            format!(
+                "`exploring_starts` draws start states from the finite model of {id}: it has none"
+            ),
+            "leave it out: epsilon explores too",
+        );
     }
+    if !agent.value.is_predictor() || agent.value.params["policy"] == ParamValue::Word("random") {
+        return Ok(());
+    }
+    if let Some(f) = &draft.allowed {
+        return Err(Diagnostic::error(format!("`{name}` plays the policy that it is given"))
+            .at(f.spot.place())
+            .hint("leave out `allowed`, or say `policy: \"random\"`"));
+    }
+    if agent.value.params["policy"] == ParamValue::Word("greedy") {
+        let why = match (has_model, discretiser) {
+            (false, _) => "it has none",
+            (true, DiscretiserSpec::StateIndex)
+                if draft.setting.frame_skip.is_none_or(|n| n == 1) =>
+            {
+                return Ok(());
+            }
+            (true, DiscretiserSpec::StateIndex) => "it speaks of single steps, not of `frame_skip`",
+            (true, _) => "it speaks of states, not of a discretiser's cells",
+        };
+        return refuse(
+            format!(
+                "`policy: \"greedy\"` of `{name}` is planned on the finite model of {id}: {why}"
+            ),
+            "give the policy as a function: `policy: |s| 0` always plays action 0",
+        );
+    }
+    Ok(())
 }

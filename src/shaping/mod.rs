@@ -3,7 +3,7 @@
 //! - [`Discretiser`]: observation → what the agent sees. [`StateIndex`], [`Bins`],
 //!   [`ScriptedCells`], [`RawFields`]; [`Shield`]: the actions allowed there
 //! - [`Features`]: the state's numbers → features, for linear values; [`Tiles`], [`Fourier`]
-//! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`RawPotential`]
+//! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`EpisodePotential`], [`RawPotential`]
 //! - [`Scale`]: observation normalisation
 //! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
 //!   [`ScriptedReward`]
@@ -28,8 +28,8 @@ pub use discretiser::{
 };
 pub use features::{Active, FeatureKind, FeatureSpec, Features, Fourier, MAX_WEIGHTS, Tiles};
 pub use potential::{
-    ActionFn, AnyPotential, CellPhiFn, CellPotential, NoPotential, PhiFn, Potential, RawPotential,
-    potential_term, shaped_model,
+    ActionFn, AnyPotential, CellEpisodeFn, CellPhiFn, CellPotential, EpisodePotential, NoPotential,
+    PhiFn, Potential, RawPotential, potential_term, shaped_model,
 };
 pub use reward::{
     AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,

@@ -11,7 +11,7 @@ const RULES: [Rules; 3] = [Rules::Plain, Rules::Natural, Rules::SuttonBarto];
 
 fn solve(mdp: &FiniteMdp) -> QTable {
     let planner = ValueIteration { gamma: 1.0, theta: 0.0, max_sweeps: 100 };
-    let solution = planner.solve(mdp, &vec![0.0; mdp.n_states()]);
+    let solution = planner.solve(mdp, &vec![0.0; mdp.n_states()]).unwrap();
     // No hand takes more than 21 cards.
     assert!(solution.converged && solution.changes.len() <= 23);
     solution.q

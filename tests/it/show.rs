@@ -4,7 +4,7 @@ use std::path::Path;
 
 use runner::env::make;
 use runner::learn::greedy_set;
-use runner::learn::planning::PolicyIteration;
+use runner::learn::planning::{Planner, PolicyIteration};
 use serde_json::Value;
 
 use crate::support::{
@@ -38,7 +38,7 @@ fn the_values_of_a_solved_lake_are_the_exact_ones_shaped_or_not() {
         let kwargs = serde_json::json!({ "is_slippery": slippery });
         let mdp = make("FrozenLake-v1", kwargs.as_object().unwrap()).unwrap();
         let mdp = mdp.finite().unwrap().clone();
-        let q = PolicyIteration { gamma: 0.99 }.solve(&mdp).unwrap();
+        let q = PolicyIteration { gamma: 0.99 }.solve(&mdp, &[0.0; 16]).unwrap().q;
         (mdp.reachable(), q)
     };
     for (variant, slippery) in [("dry", false), ("ice", true), ("ice-shaped", true)] {

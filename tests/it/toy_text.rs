@@ -72,7 +72,7 @@ fn run(script: &str) -> Vec<(f64, &'static str, String)> {
             let record = run_unit(&host, variant, 0, &AtomicBool::new(false), &mut |_| {}).unwrap();
             let last = &record.rows[record.rows.len() - 100..];
             let mean = last.iter().map(|row| row.native).sum::<f64>() / 100.0;
-            let audit = audit_variant(&host, variant).unwrap();
+            let audit = audit_variant(&host, variant, None).unwrap();
             (mean, audit.verdict, audit.basis)
         })
         .collect()

@@ -16,11 +16,11 @@ use std::path::{Path, PathBuf};
 
 use self::atomic::{is_stale, sync_folder, temporary_prefix};
 use self::format::{
-    ResultFile, SCHEMA, initial_value, is_initial, mark, monitor, policy, read_monitor,
-    read_policy, sweeps,
+    ResultFile, SCHEMA, StoredValue, initial_value, is_initial, mark, monitor, policy,
+    read_monitor, read_policy, read_values, sweeps, values,
 };
 use self::weights::{Initial, weights};
-use super::record::{EpisodeRow, Learned, UnitRecord};
+use super::record::{EpisodeRow, Learned, UnitRecord, Values};
 use super::unit::Unit;
 use crate::learn::QTable;
 use crate::script::Variant;
@@ -65,16 +65,19 @@ pub struct StoredUnit {
     /// Its greedy policy and values: `(state, values)` of every state whose values were learned.
     /// Where values are linear, `(feature, weights)`.
     pub q: Vec<(usize, Vec<f64>)>,
-    /// Number of states (or features) and actions of the table.
+    /// Its state values, if that is what was learned: `(state, value, exact value)`, of the same
+    /// states.
+    pub values: Vec<StoredValue>,
+    /// Number of states (or features) and actions of the table; no actions if it holds state values.
     pub shape: (usize, usize),
 }
 
 impl StoredUnit {
-    /// The table of action values (or of weights), if the agent of `variant`, whose unit this is,
-    /// keeps one.
+    /// The values (or the weights), if the agent of `variant`, whose unit this is, keeps any.
     pub fn learned(&self, variant: &Variant) -> Option<Learned> {
         let (n_states, n_actions) = self.shape;
-        if n_actions == 0 {
+        let initial = initial_value(variant);
+        if n_states == 0 {
             return None;
         }
         if let Some(initial) = Initial::of(variant, n_actions) {
@@ -82,9 +85,18 @@ impl StoredUnit {
             for (feature, row) in &self.q {
                 experienced[*feature] = !initial.holds(*feature, row);
             }
-            return Some(Learned { q: initial.filled(&self.q).weights().clone(), experienced });
+            let weights = initial.filled(&self.q).weights().clone();
+            return Some(Learned { values: Values::Q(weights), experienced });
         }
-        let initial = initial_value(variant);
+        if n_actions == 0 {
+            let mut v = vec![initial.unwrap_or(0.0); n_states];
+            let mut experienced = vec![false; n_states];
+            for &(s, value, _) in &self.values {
+                v[s] = value;
+                experienced[s] = !is_initial(&[value], initial);
+            }
+            return Some(Learned { values: Values::V(v), experienced });
+        }
         let mut q = QTable::new(n_states, n_actions, initial.unwrap_or(0.0));
         let mut experienced = vec![false; n_states];
         for (s, values) in &self.q {
@@ -93,7 +105,7 @@ impl StoredUnit {
             }
             experienced[*s] = !is_initial(values, initial);
         }
-        Some(Learned { q, experienced })
+        Some(Learned { values: Values::Q(q), experienced })
     }
 }
 
@@ -211,6 +223,9 @@ impl Store {
         if let Some(w) = &record.weights {
             files.push(("weights.csv", weights(variant, w)));
         }
+        if let Some(v) = &record.values {
+            files.push(("values.csv", values(variant, v)));
+        }
         if !record.sweeps.is_empty() {
             files.push(("sweeps.csv", sweeps(&record.sweeps)));
         }
@@ -221,7 +236,10 @@ impl Store {
             seed: unit.seed,
             episodes: record.rows.len() as u32,
             steps: record.steps(),
-            states: record.q.as_ref().map_or(0, QTable::n_states),
+            states: record
+                .q
+                .as_ref()
+                .map_or(record.values.as_ref().map_or(0, |v| v.v.len()), QTable::n_states),
             actions: record.q.as_ref().or(record.weights.as_ref()).map_or(0, QTable::n_actions),
             features: record.weights.as_ref().map_or(0, QTable::n_states),
             files: files.iter().map(|(name, bytes)| ((*name).into(), mark(bytes))).collect(),
@@ -290,13 +308,16 @@ impl Store {
         let (result, files) = self.verified(unit)?;
         let folder = self.path(unit);
         let shape = (result.states + result.features, result.actions);
-        let mut stored = StoredUnit { rows: Vec::new(), q: Vec::new(), shape };
+        let mut stored = StoredUnit { rows: Vec::new(), q: Vec::new(), values: Vec::new(), shape };
         for (name, bytes) in &files {
             let bad = |what: String| StoreError::new(&folder.join(name), what);
             match name.as_str() {
                 "monitor.csv" => stored.rows = read_monitor(bytes).map_err(bad)?,
                 "weights.csv" => stored.q = weights::read(bytes, shape).map_err(bad)?,
                 "policy.csv" => stored.q = read_policy(bytes, stored.shape).map_err(bad)?,
+                "values.csv" => {
+                    stored.values = read_values(bytes, stored.shape.0).map_err(bad)?;
+                }
                 _ => {}
             }
         }

@@ -4,11 +4,13 @@
 //! - one step: [`QLearning`], [`Sarsa`], [`ExpectedSarsa`], [`DoubleQLearning`], [`SoftQLearning`]
 //! - several: [`NStepSarsa`], and with eligibility [`Trace`]s [`SarsaLambda`] and [`QLambda`]
 //! - with a model learned on the way: [`DynaQ`]
+//! - with advice on actions: [`Advised`]
 //! - [`Tabular`]: what they share
 //!
 //! Every one bootstraps from the state in which an episode was truncated and from no terminal
 //! state, and takes into account only actions that the shield allows.
 
+mod advised;
 mod double_q_learning;
 mod dyna_q;
 mod expected_sarsa;
@@ -21,6 +23,7 @@ mod soft_q_learning;
 mod tabular;
 mod traces;
 
+pub use advised::{Advised, Backup};
 pub use double_q_learning::DoubleQLearning;
 pub use dyna_q::DynaQ;
 pub use expected_sarsa::ExpectedSarsa;

@@ -1,80 +1,69 @@
-//! Exact policy evaluation: solves `(I − γ P_π) V = R_π` by LU decomposition.
+//! Exact policy evaluation: solves `(I − γ P_π) V = R_π` (Sutton & Barto 2018, section 4.1).
 
-use nalgebra::{DMatrix, DVector};
-
+use super::PlanError;
+use super::dynamics::{Dynamics, Over};
 use crate::mdp::{Action, FiniteMdp};
 
-/// The linear system has no unique solution: with γ = 1, a policy that never ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PolicyValueError;
+/// A stationary policy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Policy<'a> {
+    /// Plays `policy[s]` in state s.
+    Deterministic(&'a [Action]),
+    /// Plays action a in state s with probability `policy[s * n_actions + a]`.
+    Stochastic(&'a [f64]),
+    /// Plays every action with the same probability.
+    Uniform,
+}
 
-impl std::fmt::Display for PolicyValueError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("the policy's value is not defined: with gamma = 1 it may never end")
+impl Policy<'_> {
+    /// π(a | s).
+    #[inline]
+    pub fn share(&self, s: usize, a: usize, n_actions: usize) -> f64 {
+        match self {
+            Self::Deterministic(policy) => f64::from(u8::from(policy[s] == a)),
+            Self::Stochastic(policy) => policy[s * n_actions + a],
+            Self::Uniform => 1.0 / n_actions as f64,
+        }
     }
 }
 
-impl std::error::Error for PolicyValueError {}
+/// The value of a policy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PolicyValue {
+    /// V^π, one per state.
+    pub v: Vec<f64>,
+    /// No value is further than this from the exact one.
+    pub bound: f64,
+}
 
-/// V^π of the policy that plays `policy[s]` in state s. Returns one value per state.
+/// V^π of `policy` (by the model's states), one value per state; 0 for states that take no part.
 ///
-/// Dense: meant for models of up to a few thousand states.
+/// Exact up to rounding: the equations are solved one strongly connected component after the other,
+/// small ones by LU decomposition, large ones by a Krylov method.
 ///
 /// # Errors
-/// If the system is singular.
+/// If γ = 1 and the policy may never end, or a value is not finite.
 pub fn policy_value(
     mdp: &FiniteMdp,
     gamma: f64,
-    policy: &[Action],
-) -> Result<Vec<f64>, PolicyValueError> {
-    let n = mdp.n_states();
-    let mut system = DMatrix::<f64>::identity(n, n);
-    let mut rewards = DVector::<f64>::zeros(n);
-    for s in 0..n {
-        for o in mdp.of(s, policy[s]) {
-            rewards[s] += o.probability * o.reward;
-            if !o.terminated {
-                system[(s, o.next_state as usize)] -= gamma * o.probability;
-            }
+    policy: Policy<'_>,
+    over: Over,
+) -> Result<PolicyValue, PlanError> {
+    let dynamics = Dynamics::new(mdp, over);
+    let states = 0..dynamics.len();
+    let rewards = dynamics.rewards(mdp);
+    let value = match policy {
+        Policy::Uniform => dynamics.value(&rewards, gamma, policy),
+        Policy::Deterministic(policy) => {
+            let policy: Vec<Action> = states.map(|place| policy[dynamics.state(place)]).collect();
+            dynamics.value(&rewards, gamma, Policy::Deterministic(&policy))
         }
-    }
-    let v = system.lu().solve(&rewards).ok_or(PolicyValueError)?;
-    if v.iter().all(|x| x.is_finite()) { Ok(v.as_slice().to_vec()) } else { Err(PolicyValueError) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mdp::Outcome;
-
-    #[test]
-    fn a_two_state_chain_by_hand() {
-        // Each state exits with reward 1 with probability 1/2, else moves to the other for 0:
-        // V = 1/2 + γ/2 V, so V = 1 / (2 - γ).
-        let half = |next_state, reward, terminated| Outcome {
-            probability: 0.5,
-            next_state,
-            reward,
-            terminated,
-        };
-        let mdp = FiniteMdp::new(
-            &[
-                vec![vec![half(0, 1.0, true), half(1, 0.0, false)]],
-                vec![vec![half(1, 1.0, true), half(0, 0.0, false)]],
-            ],
-            vec![1.0, 0.0],
-        )
-        .unwrap();
-        for v in policy_value(&mdp, 0.9, &[0, 0]).unwrap() {
-            assert!((v - 1.0 / 1.1).abs() < 1e-15);
+        Policy::Stochastic(policy) => {
+            let n = mdp.n_actions();
+            let row = |place| &policy[dynamics.state(place) * n..][..n];
+            let policy: Vec<f64> = states.flat_map(row).copied().collect();
+            dynamics.value(&rewards, gamma, Policy::Stochastic(&policy))
         }
-    }
-
-    #[test]
-    fn an_endless_policy_has_no_undiscounted_value() {
-        let stay = Outcome { probability: 1.0, next_state: 0, reward: -1.0, terminated: false };
-        let mdp = FiniteMdp::new(&[vec![vec![stay]]], vec![1.0]).unwrap();
-        assert!(policy_value(&mdp, 1.0, &[0]).is_err());
-        assert!((policy_value(&mdp, 0.9, &[0]).unwrap()[0] + 10.0).abs() < 1e-12);
-    }
+    }?;
+    Ok(PolicyValue { v: dynamics.unpack(&value.v), bound: value.bound })
 }

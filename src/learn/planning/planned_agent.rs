@@ -5,7 +5,8 @@ use crate::learn::greedy::argmax_allowed;
 use crate::learn::{Agent, Last, Learn, QTable, Seen};
 use crate::mdp::Action;
 
-/// Plays a planner's greedy policy and learns nothing.
+/// Plays a planner's policy and learns nothing; where a shield refuses its action, the best of those
+/// that are allowed.
 #[derive(Debug, Clone)]
 pub struct PlannedAgent {
     solution: Solution,
@@ -13,7 +14,7 @@ pub struct PlannedAgent {
 }
 
 impl PlannedAgent {
-    /// Plays greedily with respect to the solution's action values.
+    /// Plays the solution's policy.
     pub fn new(solution: Solution, gamma: f64) -> Self {
         Self { solution, gamma }
     }
@@ -40,12 +41,17 @@ impl Agent for PlannedAgent {
     fn q(&self) -> Option<&QTable> {
         Some(&self.solution.q)
     }
+
+    fn v(&self) -> Option<&[f64]> {
+        Some(&self.solution.v)
+    }
 }
 
 impl<S: Seen> Learn<S> for PlannedAgent {
     #[inline]
     fn begin(&mut self, s: S) -> Action {
-        argmax_allowed(self.solution.q.row(s.cell()), s)
+        let action = self.solution.policy[s.cell()];
+        if s.allows(action) { action } else { argmax_allowed(self.solution.q.row(s.cell()), s) }
     }
 
     #[inline]

@@ -3,35 +3,13 @@
 //! `V(s) ← max_a Σ p(s′, r | s, a) [r + γ V(s′)]`, sweeping the states in order and in place
 //! (Gauss–Seidel), until no value changes by more than θ.
 //!
-//! When it stops, every value is within `θ γ / (1 − γ)` of the optimum (γ < 1).
+//! When it stops, every value is within `θ γ / (1 − γ)` of the optimum (γ < 1): the sweep is a
+//! contraction by γ (Puterman 1994, section 6.3).
 
-use crate::learn::QTable;
+use super::problem::Problem;
+use super::{Dynamics, Over, PlanError, Planner, Solution};
+use crate::learn::{QTable, argmax_tol};
 use crate::mdp::FiniteMdp;
-
-/// Solves a model.
-pub trait Planner {
-    /// The optimal values of `mdp`, starting from `v0` (one value per state).
-    ///
-    /// Shaped models should start from −Φ: sweep by sweep the values then equal those of the plain
-    /// model from 0, minus Φ.
-    fn solve(&self, mdp: &FiniteMdp, v0: &[f64]) -> Solution;
-
-    /// The discount factor.
-    fn gamma(&self) -> f64;
-}
-
-/// What a planner found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solution {
-    /// State values, one per state.
-    pub v: Vec<f64>,
-    /// Action values.
-    pub q: QTable,
-    /// The largest change of each sweep.
-    pub changes: Vec<f64>,
-    /// Whether the last change was at most θ.
-    pub converged: bool,
-}
 
 /// Value iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,46 +22,28 @@ pub struct ValueIteration {
     pub max_sweeps: usize,
 }
 
-/// `Σ p (r + γ V(s′))` over the outcomes of (s, a); V is 0 beyond a terminal transition.
-#[inline]
-fn backup(mdp: &FiniteMdp, gamma: f64, v: &[f64], s: usize, a: usize) -> f64 {
-    let mut sum = 0.0;
-    for o in mdp.of(s, a) {
-        let next = if o.terminated { 0.0 } else { v[o.next_state as usize] };
-        sum += o.probability * (o.reward + gamma * next);
-    }
-    sum
-}
-
-/// `Q(s, a) = Σ p(s′, r | s, a) [r + γ V(s′)]`; `v` has one value per state.
-pub fn q_from_v(mdp: &FiniteMdp, gamma: f64, v: &[f64]) -> QTable {
-    let n_actions = mdp.n_actions();
-    let mut values = Vec::with_capacity(mdp.n_states() * n_actions);
-    for s in 0..mdp.n_states() {
-        values.extend((0..n_actions).map(|a| backup(mdp, gamma, v, s, a)));
-    }
-    QTable::from_values(n_actions, values)
-}
-
 impl Planner for ValueIteration {
-    fn solve(&self, mdp: &FiniteMdp, v0: &[f64]) -> Solution {
+    fn solve(&self, mdp: &FiniteMdp, v0: &[f64]) -> Result<Solution, PlanError> {
+        let dynamics = Dynamics::new(mdp, Over::Every);
+        let rewards = dynamics.rewards(mdp);
+        let problem =
+            Problem { dynamics: &dynamics, rewards: &rewards, gamma: self.gamma, allowed: None };
         let mut v = v0.to_vec();
         let mut changes = Vec::new();
         let mut converged = false;
         while !converged && changes.len() < self.max_sweeps {
-            let mut change = 0.0f64;
-            for s in 0..mdp.n_states() {
-                let best = (0..mdp.n_actions())
-                    .map(|a| backup(mdp, self.gamma, &v, s, a))
-                    .fold(f64::NEG_INFINITY, f64::max);
-                change = change.max((best - v[s]).abs());
-                v[s] = best;
-            }
+            let change = problem.sweep_in_place(&mut v);
             changes.push(change);
             converged = change <= self.theta;
         }
-        let q = q_from_v(mdp, self.gamma, &v);
-        Solution { v, q, changes, converged }
+        let q = dynamics.q_from_v(&rewards, self.gamma, &v);
+        let q = QTable::from_values(mdp.n_actions(), q);
+        let policy = (0..mdp.n_states()).map(|s| argmax_tol(q.row(s))).collect();
+        let bound = changes
+            .last()
+            .filter(|_| self.gamma < 1.0)
+            .map(|change| change * self.gamma / (1.0 - self.gamma));
+        Ok(Solution { v, q, policy, changes, switched: Vec::new(), converged, bound })
     }
 
     fn gamma(&self) -> f64 {
@@ -112,7 +72,7 @@ mod tests {
     #[test]
     fn values_by_hand() {
         let vi = ValueIteration { gamma: 0.9, theta: 1e-12, max_sweeps: 100 };
-        let solution = vi.solve(&model(), &[0.0; 2]);
+        let solution = vi.solve(&model(), &[0.0; 2]).unwrap();
         assert!(solution.converged);
         assert_eq!(solution.v, [1.8, 2.0]);
         assert_eq!(solution.q.values(), [1.0, 1.8, 2.0, 2.0]);
@@ -121,6 +81,6 @@ mod tests {
     #[test]
     fn a_sweep_limit_is_reported_as_not_converged() {
         let vi = ValueIteration { gamma: 0.9, theta: 1e-12, max_sweeps: 1 };
-        assert!(!vi.solve(&model(), &[0.0; 2]).converged);
+        assert!(!vi.solve(&model(), &[0.0; 2]).unwrap().converged);
     }
 }

@@ -3,7 +3,7 @@
 use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, STEP_SIZE, UNIT};
 use super::{AgentSpec, AnyAgent, Build, Setup, linear};
 use crate::learn::control::{
-    DoubleQLearning, DynaQ, ExpectedSarsa, NStepSarsa, QLambda, SarsaLambda, SoftQLearning,
+    Backup, DoubleQLearning, DynaQ, ExpectedSarsa, NStepSarsa, QLambda, SarsaLambda, SoftQLearning,
     Tabular, Trace, Traces,
 };
 use crate::learn::{
@@ -13,7 +13,7 @@ use crate::learn::{
 use crate::mdp::streams::Stream;
 
 /// With any behaviour and step size.
-fn table(c: &AgentConfig, mut setup: Setup) -> Tabular {
+pub(super) fn table(c: &AgentConfig, mut setup: Setup) -> Tabular {
     let behaviour = (c.exploration(), c.schedule("epsilon"));
     Tabular::new(setup.table(c), c.float("gamma"), c.alpha(), behaviour, setup.stream)
 }
@@ -28,33 +28,34 @@ fn schedules(c: &AgentConfig) -> Option<(Schedule, Schedule)> {
     }
 }
 
-pub(super) fn traces(c: &AgentConfig, n_pairs: usize) -> Traces {
+/// The traces of `n_entries`.
+pub(super) fn traces(c: &AgentConfig, n_entries: usize) -> Traces {
     let kind = match c.word("traces") {
         "replacing" => Trace::Replacing,
         "dutch" => Trace::Dutch,
         _ => Trace::Accumulating,
     };
     let decay = c.float("gamma") * c.float("lambda");
-    Traces::new(kind, decay, c.float("trace_cutoff"), n_pairs)
+    Traces::new(kind, decay, c.float("trace_cutoff"), n_entries)
 }
 
 const ONE_STEP: &[ParamSpec] = &[STEP_SIZE, GAMMA, EPSILON, EXPLORATION, INITIAL_Q];
 
-const LAMBDA: ParamSpec = ParamSpec {
+pub(super) const LAMBDA: ParamSpec = ParamSpec {
     name: "lambda",
     kind: UNIT,
     function: None,
     default: ParamValue::Float(0.9),
     doc: "decay of the traces: 0 looks one step ahead, 1 to the end of the episode",
 };
-const TRACES: ParamSpec = ParamSpec {
+pub(super) const TRACES: ParamSpec = ParamSpec {
     name: "traces",
     kind: ParamKind::Word(&["accumulating", "replacing", "dutch"]),
     function: None,
     default: ParamValue::Word("accumulating"),
     doc: "what a visit does to a trace e: adds 1, sets it to 1, or adds 1 − αe",
 };
-const TRACE_CUTOFF: ParamSpec = ParamSpec {
+pub(super) const TRACE_CUTOFF: ParamSpec = ParamSpec {
     name: "trace_cutoff",
     kind: UNIT,
     function: None,
@@ -68,14 +69,17 @@ pub(super) const Q_LEARNING: AgentSpec = AgentSpec {
     name: "q_learning",
     doc: "Q-learning (Watkins 1989; Sutton & Barto 6.5)",
     params: ONE_STEP,
-    build: Build::Learner(|c, mut setup| match schedules(c) {
-        Some((alpha, epsilon)) => {
-            let q = setup.table(c);
-            let agent = QLearning::new(q, c.float("gamma"), alpha, epsilon, setup.stream);
-            AnyAgent::QLearning(agent)
-        }
-        None => AnyAgent::tabular(QLearning::of(table(c, setup))),
-    }),
+    build: Build::OneStep {
+        backup: Backup::Best,
+        build: |c, mut setup| match schedules(c) {
+            Some((alpha, epsilon)) => {
+                let q = setup.table(c);
+                let agent = QLearning::new(q, c.float("gamma"), alpha, epsilon, setup.stream);
+                AnyAgent::QLearning(agent)
+            }
+            None => AnyAgent::tabular(QLearning::of(table(c, setup))),
+        },
+    },
     linear: Some(linear::q_learning),
 };
 
@@ -83,13 +87,16 @@ pub(super) const SARSA: AgentSpec = AgentSpec {
     name: "sarsa",
     doc: "SARSA (Rummery & Niranjan 1994; Sutton & Barto 6.4)",
     params: ONE_STEP,
-    build: Build::Learner(|c, mut setup| match schedules(c) {
-        Some((alpha, epsilon)) => {
-            let q = setup.table(c);
-            AnyAgent::Sarsa(Sarsa::new(q, c.float("gamma"), alpha, epsilon, setup.stream))
-        }
-        None => AnyAgent::tabular(Sarsa::of(table(c, setup))),
-    }),
+    build: Build::OneStep {
+        backup: Backup::Played,
+        build: |c, mut setup| match schedules(c) {
+            Some((alpha, epsilon)) => {
+                let q = setup.table(c);
+                AnyAgent::Sarsa(Sarsa::new(q, c.float("gamma"), alpha, epsilon, setup.stream))
+            }
+            None => AnyAgent::tabular(Sarsa::of(table(c, setup))),
+        },
+    },
     linear: Some(linear::sarsa),
 };
 
@@ -97,7 +104,10 @@ pub(super) const EXPECTED_SARSA: AgentSpec = AgentSpec {
     name: "expected_sarsa",
     doc: "expected SARSA (van Seijen et al. 2009; Sutton & Barto 6.6)",
     params: ONE_STEP,
-    build: Build::Learner(|c, setup| AnyAgent::tabular(ExpectedSarsa::new(table(c, setup)))),
+    build: Build::OneStep {
+        backup: Backup::Expected,
+        build: |c, setup| AnyAgent::tabular(ExpectedSarsa::new(table(c, setup))),
+    },
     linear: Some(linear::expected_sarsa),
 };
 
@@ -129,7 +139,7 @@ pub(super) const N_STEP_SARSA: AgentSpec = AgentSpec {
         EXPLORATION,
         INITIAL_Q,
     ],
-    build: Build::Learner(|c, setup| {
+    build: Build::OnPolicy(|c, setup| {
         AnyAgent::tabular(NStepSarsa::new(table(c, setup), c.int("n") as usize))
     }),
     linear: None,
@@ -139,7 +149,7 @@ pub(super) const SARSA_LAMBDA: AgentSpec = AgentSpec {
     name: "sarsa_lambda",
     doc: "SARSA(λ) with eligibility traces (Rummery 1995; Sutton & Barto 12.7)",
     params: WITH_TRACES,
-    build: Build::Learner(|c, setup| {
+    build: Build::OnPolicy(|c, setup| {
         let traces = traces(c, setup.n_states * setup.n_actions);
         AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
     }),

@@ -5,13 +5,18 @@
 
 mod control;
 mod linear;
+mod monte_carlo;
 mod planners;
+mod prediction;
 mod shared;
 
 pub use self::linear::BuildLinear;
+use super::control::{Advised, Backup};
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
+use super::prediction::GivenPolicy;
 use super::{Learn, QLearning, QTable, Sarsa};
+use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 use crate::shaping::Shielded;
 
@@ -28,6 +33,10 @@ pub struct Setup {
     pub stream: Stream,
     /// Initial action values, shape `[n_states, n_actions]`, where a script gives them.
     pub initial_q: Option<Vec<f64>>,
+    /// Initial state values, shape `[n_states]`, where a script gives them.
+    pub initial_v: Option<Vec<f64>>,
+    /// What a predictor plays in each state, shape `[n_states]`; anything if there is nothing.
+    pub policy: Option<Vec<Action>>,
 }
 
 impl Setup {
@@ -38,13 +47,35 @@ impl Setup {
             None => QTable::new(self.n_states, self.n_actions, config.float("initial_q")),
         }
     }
+
+    /// What a predictor plays.
+    fn given_policy(self) -> GivenPolicy {
+        match self.policy {
+            Some(actions) => GivenPolicy::Fixed(actions),
+            None => GivenPolicy::Random { n_actions: self.n_actions, stream: self.stream },
+        }
+    }
 }
+
+/// Makes a learner.
+pub type BuildFn = fn(&AgentConfig, Setup) -> AnyAgent;
 
 /// How an agent comes to be.
 #[derive(Debug, Clone, Copy)]
 pub enum Build {
     /// A learner.
-    Learner(fn(&AgentConfig, Setup) -> AnyAgent),
+    Learner(BuildFn),
+    /// A learner of the state values of a policy that is given.
+    Predictor(BuildFn),
+    /// A learner of the values of the policy that it plays.
+    OnPolicy(BuildFn),
+    /// A learner of action values with one-step targets.
+    OneStep {
+        /// How it is built.
+        build: BuildFn,
+        /// What its target bootstraps from.
+        backup: Backup,
+    },
     /// A planner, which needs the environment's finite model.
     Planner(fn(&AgentConfig) -> Box<dyn Planner>),
 }
@@ -62,6 +93,30 @@ pub struct AgentSpec {
     pub build: Build,
     /// How it is built where values are linear in features, if it can learn such.
     pub linear: Option<BuildLinear>,
+}
+
+impl AgentSpec {
+    /// Whether it takes look-ahead advice, and can be shaped by its own values.
+    pub fn is_one_step(&self) -> bool {
+        matches!(self.build, Build::OneStep { .. })
+    }
+
+    /// Whether it takes look-back advice: it learns the values of the policy it plays.
+    pub fn is_on_policy(&self) -> bool {
+        match self.build {
+            Build::OnPolicy(_) => true,
+            Build::OneStep { backup, .. } => backup != Backup::Best,
+            Build::Learner(_) | Build::Predictor(_) | Build::Planner(_) => false,
+        }
+    }
+
+    /// The agent as it is with look-ahead advice `phi`, shape `[n_states, n_actions]`; `None` if it
+    /// takes none.
+    pub fn advised(&self, config: &AgentConfig, setup: Setup, phi: QTable) -> Option<AnyAgent> {
+        let Build::OneStep { backup, .. } = self.build else { return None };
+        let table = control::table(config, setup);
+        Some(AnyAgent::tabular(Advised::new(backup, table, phi)))
+    }
 }
 
 /// Any agent whose states are the rows of a table, with a shield or without.
@@ -123,6 +178,12 @@ impl AnyAgent {
 pub static AGENTS: &[AgentSpec] = &[
     control::Q_LEARNING,
     control::SARSA,
+    monte_carlo::MONTE_CARLO,
+    monte_carlo::OFF_POLICY_MONTE_CARLO,
+    prediction::MC_PREDICTION,
+    prediction::TD0,
+    prediction::TD_LAMBDA,
+    prediction::N_STEP_TD,
     control::EXPECTED_SARSA,
     control::DOUBLE_Q_LEARNING,
     control::N_STEP_SARSA,
@@ -131,6 +192,7 @@ pub static AGENTS: &[AgentSpec] = &[
     control::DYNA_Q,
     control::SOFT_Q_LEARNING,
     planners::VALUE_ITERATION,
+    planners::POLICY_ITERATION,
     planners::RANDOM_AGENT,
 ];
 

@@ -14,6 +14,7 @@ use super::engine::Context;
 use super::params::{number, show, whole};
 use super::plan::GoldenBudget;
 use super::setting::Entries;
+use super::shaping::LearnedPotential;
 use crate::env::frozen_lake::{MAX_TILES, random_map_within};
 use crate::mdp::numpy::Seed;
 
@@ -84,12 +85,14 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     engine.register_type_with_name::<ExperimentDraft>("experiment");
     engine.register_type_with_name::<StudyDraft>("study");
     engine.register_type_with_name::<EnvDraft>("environment");
+    engine.register_type_with_name::<LearnedPotential>("learned potential");
     experiments(engine, context);
     studies(engine, context);
     environments(engine, context);
     agents::register(engine, context);
     discretisers::register(engine, context);
     features::register(engine, context);
+    potentials(engine, context);
 }
 
 fn experiments(engine: &mut Engine, context: &Rc<Context>) {
@@ -231,4 +234,15 @@ fn random_map(
     operations.set(operations.get() + budget - left);
     let rows = map.map_err(|e| at(1)(Diagnostic::error(e.message).maybe_hint(e.hint)))?;
     Ok(rows.into_iter().map(Dynamic::from).collect())
+}
+
+fn potentials(engine: &mut Engine, context: &Rc<Context>) {
+    let c = context.clone();
+    engine.register_fn("learned", move |native: NativeCallContext, eta: Dynamic| {
+        let call = Call::new(&c, &native);
+        let finite = number(&eta).filter(|eta| eta.is_finite()).map(LearnedPotential);
+        call.finish(finite.ok_or_else(|| {
+            Diagnostic::error(format!("`learned` takes a finite number, got {}", show(&eta)))
+        }))
+    });
 }
