@@ -6,7 +6,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use runner::env::cart_pole::CartPole;
 use runner::experiment::{Limits, World, train};
-use runner::learn::{Agent, QLearning, QTable, Sarsa, Schedule};
+use runner::learn::{Learn, QLearning, QTable, Sarsa, Schedule};
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::streams::Stream;
 use runner::mdp::{Env, FiniteMdp};
@@ -36,14 +36,14 @@ where
     D: Discretiser<E>,
     P: Potential<E>,
     R: RewardModel<E>,
-    A: Agent,
+    A: Learn<D::State>,
 {
     let table = QTable::new(world.discretiser.n_cells(), world.env.n_actions(), 0.0);
     let (alpha, epsilon) = (Schedule::constant(ALPHA), Schedule::constant(EPSILON));
     let mut agent = learner(table, GAMMA, alpha, epsilon, Stream::new(0, "agent"));
     let mut steps = 0;
     let mut rng = NumpyRng::from_u64(0);
-    train(world, &mut agent, limits, &mut rng, &AtomicBool::new(false), |row| {
+    train(world, &mut agent, limits, &mut rng, &AtomicBool::new(false), |row, _| {
         steps += u64::from(row.steps);
     })
     .expect("nothing here can fail");
@@ -60,7 +60,7 @@ fn measure<E, D, P, R, A>(
     D: Discretiser<E>,
     P: Potential<E>,
     R: RewardModel<E>,
-    A: Agent,
+    A: Learn<D::State>,
 {
     // Every run is the same: its steps can be counted beforehand.
     let steps = run(&mut world, learner, limits);

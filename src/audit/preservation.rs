@@ -26,6 +26,17 @@ pub enum Verdict {
     Inconclusive,
 }
 
+impl Verdict {
+    /// Whether the greedy sets are equal; `None` if the numbers cannot tell.
+    pub fn preserved(self) -> Option<bool> {
+        match self {
+            Self::Preserved => Some(true),
+            Self::Changed => Some(false),
+            Self::Inconclusive => None,
+        }
+    }
+}
+
 /// A comparison of two models that differ in their rewards.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Preservation {

@@ -9,7 +9,7 @@ use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::check;
 use crate::report::claims::rehearse;
-use crate::script::{Callback, Diagnostic, DiscretiserSpec, PhiOn, Plan, Variant, load};
+use crate::script::{AdviceOn, Callback, Diagnostic, DiscretiserSpec, PhiOn, Plan, Variant, load};
 
 #[derive(Debug, ClapArgs)]
 pub(super) struct Args {
@@ -90,7 +90,7 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     let kwargs: Vec<String> = changed.map(|(k, x)| format!("{k}: {x}")).collect();
     let kwargs =
         if kwargs.is_empty() { String::new() } else { format!(" ({})", kwargs.join(", ")) };
-    let params: Vec<String> = v.agent.params.iter().map(|(k, x)| format!("{k}: {x}")).collect();
+    let params: Vec<String> = v.agent.in_effect().map(|(k, x)| format!("{k}: {x}")).collect();
     let limit =
         v.max_steps.map_or("without a step limit".into(), |n| format!("of at most {n} steps"));
     let mut rows = vec![
@@ -132,13 +132,35 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
             (_, PhiOn::Cell) => "once per cell, on its representative",
             (_, PhiOn::Raw) => "on the raw state, interpreted at every step",
         };
+        let on = if v.is_dynamic() { format!("of every episode, {on}") } else { on.into() };
         rows.push(("potential", format!("{}, {on}", at(potential))));
     }
+    rows.extend(shaping(v));
     if let Some(reward) = &v.reward {
         rows.push(("reward", at(reward)));
     }
     for (name, term) in &v.terms {
         rows.push(("term", format!("{name}: {}", at(term))));
+    }
+    rows
+}
+
+/// What shapes the reward besides a scripted potential.
+fn shaping(v: &Variant) -> Vec<(&'static str, String)> {
+    let mut rows = Vec::new();
+    if let Some(eta) = v.shaping.learned {
+        rows.push(("potential", format!("{eta:?} times the agent's own state values")));
+    }
+    if v.shaping.shift != 0.0 {
+        let shift = v.shaping.shift;
+        rows.push(("shift", format!("{shift:?} added to Φ, except of terminal states")));
+    }
+    if let Some(advice) = &v.shaping.advice {
+        let on = match v.shaping.advice_on {
+            AdviceOn::LookAhead => "looking ahead, choices corrected by it",
+            AdviceOn::LookBack => "looking back",
+        };
+        rows.push(("advice", format!("{}, {on}", at(advice))));
     }
     rows
 }

@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let Some(execution) = train(&plan, &results, jobs, args)? else { return Ok(Outcome::Stopped) };
     let host = Host::open(&plan)?;
     let audits: Vec<Audit> =
-        plan.variants.iter().map(|v| audit_variant(&host, v)).collect::<Result<_, _>>()?;
+        plan.variants.iter().map(|v| audit_variant(&host, v, None)).collect::<Result<_, _>>()?;
     let findings = results.derive(&plan, &execution, audits)?;
     if !args.quiet {
         out(&closing_table(&plan, &findings).render())?;

@@ -4,6 +4,7 @@
 //! 1 it ran, but an expectation, a golden file or a parity check failed; 2 bad input or usage;
 //! 75 stopped, can be resumed.
 
+mod audit;
 mod check;
 mod completions;
 mod exec;
@@ -14,6 +15,7 @@ mod output;
 mod parity;
 mod play;
 mod rollout;
+mod score;
 mod screen;
 mod show;
 mod view;
@@ -39,6 +41,10 @@ enum Command {
     Exec(exec::Args),
     /// Compile scripts, call every callback on sampled states, print the plan
     Check(check::Args),
+    /// Say of each shaping whether it keeps the optimal policy: the proof, or what goes wrong
+    Audit(audit::Args),
+    /// Rank the potentials of a study before anything is trained
+    Score(score::Args),
     /// List environments, agents, functions, keys or examples
     List(list::Args),
     /// Play actions in an environment and print what happens
@@ -147,6 +153,8 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.command {
         Command::Exec(args) => exec::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Audit(args) => audit::run(&args),
+        Command::Score(args) => score::run(&args),
         Command::List(args) => list::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Show(args) => show::run(&args),

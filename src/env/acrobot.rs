@@ -58,7 +58,7 @@ use super::kwargs::{KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::{NumpyRng, sin_cos_f32};
-use crate::mdp::{Action, Env, Field, Schema, Step, widen};
+use crate::mdp::{Action, Env, Field, Schema, Step, angle, widen, within};
 
 const PI: f64 = std::f64::consts::PI;
 /// rad/s.
@@ -136,6 +136,14 @@ impl Acrobot {
     }
 }
 
+/// What a state after a step looks like, and whether the tip is high enough.
+#[inline]
+fn seen(&[t1, t2, w1, w2]: &Four) -> ([f32; 6], bool) {
+    let ((s1, c1), (s2, c2)) = (math::sin_cos(t1), math::sin_cos(t2));
+    let terminated = (-c1) - math::cos(t2 + t1) > 1.0;
+    ([c1, s1, c2, s2, w1, w2].map(|x| x as f32), terminated)
+}
+
 /// The angle in [-π, π], by whole turns.
 #[inline]
 fn wrap(mut x: f64) -> f64 {
@@ -176,10 +184,23 @@ impl Env for Acrobot {
         let w1 = w1.clamp(-MAX_SPEED_1, MAX_SPEED_1);
         let w2 = w2.clamp(-MAX_SPEED_2, MAX_SPEED_2);
         self.state = [t1, t2, w1, w2];
-        let ((s1, c1), (s2, c2)) = (math::sin_cos(t1), math::sin_cos(t2));
-        let terminated = (-c1) - math::cos(t2 + t1) > 1.0;
+        let (obs, terminated) = seen(&self.state);
         let reward = if terminated { 0.0 } else { -1.0 };
-        Step { obs: [c1, s1, c2, s2, w1, w2].map(|x| x as f32), reward, terminated }
+        Step { obs, reward, terminated }
+    }
+
+    fn set_state(&mut self, fields: &[f64]) -> Option<[f32; 6]> {
+        let &[c1, s1, c2, s2, w1, w2] = fields else { return None };
+        let (t1, t2) = (angle(c1, s1)?, angle(c2, s2)?);
+        let w1 = within(w1, -MAX_SPEED_1, MAX_SPEED_1)?;
+        let w2 = within(w2, -MAX_SPEED_2, MAX_SPEED_2)?;
+        let state = [t1, t2, w1, w2];
+        let (obs, terminated) = seen(&state);
+        if terminated {
+            return None;
+        }
+        self.state = state;
+        Some(obs)
     }
 
     fn schema(&self) -> Schema {

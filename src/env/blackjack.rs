@@ -97,18 +97,42 @@ impl Hand {
         hand
     }
 
+    fn of_cards(cards: &[u8]) -> Self {
+        let mut hand = Self::EMPTY;
+        for &card in cards {
+            hand.add(card);
+        }
+        hand
+    }
+
+    /// A hand that counts `sum` (4 to 21, or 12 to 21 with a usable ace): of two cards if it may
+    /// be, and only then a natural.
+    fn of_sum(sum: u8, ace: bool, natural: bool) -> Self {
+        match (sum, ace) {
+            (21, true) if !natural => Self::of_cards(&[1, TEN - 1, 1]),
+            (_, true) => Self::of_cards(&[1, sum - 11]),
+            (21, false) => Self::of_cards(&[TEN, TEN - 1, 2]),
+            (_, false) => Self::of_cards(&[sum - TEN.min(sum - 2), TEN.min(sum - 2)]),
+        }
+    }
+
     /// Draws a card and returns it.
     #[inline]
     fn draw(&mut self, rng: &mut NumpyRng) -> u8 {
         // Thirteen ranks, of which four count ten.
         let card = (rng.choice_index(13) as u8 + 1).min(TEN);
+        self.add(card);
+        card
+    }
+
+    #[inline]
+    fn add(&mut self, card: u8) {
         if let Some(slot) = self.cards.get_mut(self.len) {
             *slot = card;
         }
         self.len = self.len.saturating_add(1);
         self.hard = self.hard.saturating_add(u32::from(card));
         self.has_ace |= card == 1;
-        card
     }
 
     fn cards(&self) -> &[u8] {
@@ -287,6 +311,21 @@ impl Env for Blackjack {
         let (player, dealer, ace, natural) = model::decode(index);
         let (player, dealer) = (player as u32, dealer as u8);
         Some(BlackjackObs { player, dealer, ace, natural, outcome: None })
+    }
+
+    fn set_index(&mut self, index: usize) -> Option<BlackjackObs> {
+        if index >= model::N_STATES {
+            return None;
+        }
+        let (player, dealer, ace, natural) = model::decode(index);
+        if !model::is_played(player, dealer, ace) {
+            return None;
+        }
+        self.player = Hand::of_sum(player as u8, ace, natural);
+        // The second card is drawn when the player sticks, as it may: with replacement.
+        self.dealer = Hand::of_cards(&[dealer as u8]);
+        self.face = (dealer as u8 == TEN).then(|| self.face.unwrap_or(0));
+        Some(self.obs(None))
     }
 
     fn outcome_index(&self, obs: &BlackjackObs) -> Option<usize> {

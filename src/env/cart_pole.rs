@@ -51,7 +51,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, Env, Field, Schema, Step, widen};
+use crate::mdp::{Action, Env, Field, Schema, Step, widen, within};
 
 /// m/s².
 const GRAVITY: f64 = 9.8;
@@ -178,6 +178,18 @@ impl Env for CartPole {
         };
         self.fallen |= terminated;
         Step { obs: self.obs(), reward, terminated }
+    }
+
+    fn set_state(&mut self, fields: &[f64]) -> Option<[f32; 4]> {
+        let &[x, x_dot, theta, theta_dot] = fields else { return None };
+        let x = within(x, -X_LIMIT, X_LIMIT)?;
+        let theta = within(theta, -THETA_LIMIT, THETA_LIMIT)?;
+        if !(x_dot.is_finite() && theta_dot.is_finite()) {
+            return None;
+        }
+        (self.x, self.x_dot, self.theta, self.theta_dot) = (x, x_dot, theta, theta_dot);
+        self.fallen = false;
+        Some(self.obs())
     }
 
     fn schema(&self) -> Schema {

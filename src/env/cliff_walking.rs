@@ -143,6 +143,12 @@ impl Env for CliffWalking {
         Some(FiniteState { index: index as u32, outcome: FiniteState::START })
     }
 
+    fn set_index(&mut self, index: usize) -> Option<FiniteState> {
+        let obs = self.state(index).filter(|_| index < self.env.mdp().n_states())?;
+        self.env.move_to(obs.index);
+        Some(obs)
+    }
+
     fn outcome_index(&self, obs: &FiniteState) -> Option<usize> {
         (obs.outcome != FiniteState::START).then_some(obs.outcome as usize)
     }

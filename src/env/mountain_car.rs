@@ -46,7 +46,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, Env, Field, Schema, Step, widen};
+use crate::mdp::{Action, Env, Field, Schema, Step, widen, within};
 
 const MIN_POSITION: f64 = -1.2;
 const MAX_POSITION: f64 = 0.6;
@@ -76,6 +76,11 @@ impl MountainCar {
     #[inline]
     fn obs(&self) -> [f32; 2] {
         [self.position as f32, self.velocity as f32]
+    }
+
+    #[inline]
+    fn at_goal(&self, position: f64, velocity: f64) -> bool {
+        position >= GOAL_POSITION && velocity >= self.goal_velocity
     }
 }
 
@@ -118,8 +123,19 @@ impl Env for MountainCar {
                 self.velocity = 0.0;
             }
         }
-        let terminated = self.position >= GOAL_POSITION && self.velocity >= self.goal_velocity;
+        let terminated = self.at_goal(self.position, self.velocity);
         Step { obs: self.obs(), reward: -1.0, terminated }
+    }
+
+    fn set_state(&mut self, fields: &[f64]) -> Option<[f32; 2]> {
+        let &[position, velocity] = fields else { return None };
+        let position = within(position, MIN_POSITION, MAX_POSITION)?;
+        let velocity = within(velocity, -MAX_SPEED, MAX_SPEED)?;
+        if self.at_goal(position, velocity) {
+            return None;
+        }
+        (self.position, self.velocity) = (position, velocity);
+        Some(self.obs())
     }
 
     fn schema(&self) -> Schema {

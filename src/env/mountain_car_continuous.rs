@@ -48,7 +48,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, ActionSpace, Env, Field, Schema, Step, widen};
+use crate::mdp::{Action, ActionSpace, Env, Field, Schema, Step, widen, within};
 
 const MIN_POSITION: f64 = -1.2;
 const MAX_POSITION: f64 = 0.6;
@@ -91,6 +91,11 @@ impl MountainCarContinuous {
             State::Double(position, velocity) => (position, velocity),
             State::Single(position, velocity) => (position.into(), velocity.into()),
         }
+    }
+
+    #[inline]
+    fn at_goal(&self, position: f32, velocity: f32) -> bool {
+        position >= GOAL_POSITION as f32 && velocity >= self.goal_velocity as f32
     }
 
     /// Pushes with `force`. The order and the type of every operation is Gymnasium's: each rounds.
@@ -136,9 +141,7 @@ impl MountainCarContinuous {
                         velocity = 0.0;
                     }
                 }
-                let terminated =
-                    position >= GOAL_POSITION as f32 && velocity >= self.goal_velocity as f32;
-                (position, velocity, terminated)
+                (position, velocity, self.at_goal(position, velocity))
             }
         };
         self.state = State::Single(position, velocity);
@@ -199,6 +202,18 @@ impl Env for MountainCarContinuous {
     #[inline]
     fn step_box(&mut self, action: &[f32], _rng: &mut NumpyRng) -> Step<[f32; 2]> {
         self.push(action[0])
+    }
+
+    fn set_state(&mut self, fields: &[f64]) -> Option<[f32; 2]> {
+        let &[position, velocity] = fields else { return None };
+        // In float32, as after every step.
+        let position = within(position, MIN_POSITION, MAX_POSITION)? as f32;
+        let velocity = within(velocity, -MAX_SPEED, MAX_SPEED)? as f32;
+        if self.at_goal(position, velocity) {
+            return None;
+        }
+        self.state = State::Single(position, velocity);
+        Some([position, velocity])
     }
 
     fn schema(&self) -> Schema {

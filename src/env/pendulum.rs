@@ -53,7 +53,7 @@ use super::kwargs::{KwargKind, KwargSpec, Kwargs};
 use super::registered::{Example, Registered};
 use crate::mdp::math;
 use crate::mdp::numpy::NumpyRng;
-use crate::mdp::{Action, ActionSpace, Env, Field, Schema, Step, widen};
+use crate::mdp::{Action, ActionSpace, Env, Field, Schema, Step, angle, widen, within};
 
 /// rad/s.
 const MAX_SPEED: f64 = 8.0;
@@ -151,6 +151,14 @@ impl Env for Pendulum {
     #[inline]
     fn step_box(&mut self, action: &[f32], _rng: &mut NumpyRng) -> Step<[f32; 3]> {
         self.swing(action[0])
+    }
+
+    fn set_state(&mut self, fields: &[f64]) -> Option<[f32; 3]> {
+        let &[cos, sin, dot] = fields else { return None };
+        let theta = angle(cos, sin)?;
+        self.theta_dot = within(dot, -MAX_SPEED, MAX_SPEED)?;
+        self.theta = theta;
+        Some(self.obs())
     }
 
     fn schema(&self) -> Schema {

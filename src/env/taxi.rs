@@ -186,6 +186,12 @@ impl Env for Taxi {
         Some(FiniteState { index: index as u32, outcome: FiniteState::START })
     }
 
+    fn set_index(&mut self, index: usize) -> Option<FiniteState> {
+        let obs = self.state(index).filter(|_| index < self.env.mdp().n_states())?;
+        self.env.move_to(obs.index);
+        Some(obs)
+    }
+
     fn outcome_index(&self, obs: &FiniteState) -> Option<usize> {
         let known = self.fickle.is_none() && obs.outcome != FiniteState::START;
         known.then_some(obs.outcome as usize)

@@ -1,15 +1,17 @@
-//! Puts together what a variant describes: discretiser, potential, reward, agent.
+//! Puts together what a variant describes: discretiser, reward, agent.
 
+use super::predict::{Exact, given_policy};
+use super::shaped::{learner, potential};
+use super::shielded::playable;
 use crate::learn::AnyAgent;
-use crate::learn::planning::PlannedAgent;
-use crate::learn::registry::Build;
+use crate::learn::planning::{PlannedAgent, Sweep};
+use crate::learn::registry::{Build, Setup};
 use crate::mdp::streams::Stream;
 use crate::mdp::{Env, FiniteMdp, Schema};
-use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
+use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, Variant};
 use crate::shaping::{
-    AnyPotential, AnyReward, Bins, CellPotential, Fault, MAX_FIELDS, NativeReward, NoPotential,
-    Potential, RawPotential, RewardModel, ScriptedReward, TabulatedReward, Transition,
-    shaped_model,
+    AnyReward, Bins, Fault, MAX_FIELDS, NativeReward, Potential, RewardModel, ScriptedReward,
+    Shield, TabulatedReward, Transition, shaped_model,
 };
 
 /// A state with every field in the middle of its range (0 where that is unbounded): the values of
@@ -23,50 +25,121 @@ pub(super) fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
     fields
 }
 
-/// How a variant's potential is evaluated: on the states themselves, on bin centres, or raw.
-pub(super) fn potential<E: Env + Clone + 'static>(
+/// From a cell to the fields of the state that stands for it.
+pub(super) type Representative = Box<dyn Fn(usize) -> [f64; MAX_FIELDS]>;
+
+/// The state that stands for each cell: itself, or the centre of the bins. Scripted cells have
+/// none.
+pub(super) fn representative<E: Env + Clone + 'static>(
+    variant: &Variant,
+    env: &E,
+) -> Option<Representative> {
+    match &variant.discretiser {
+        DiscretiserSpec::StateIndex => {
+            let states = env.clone();
+            Some(Box::new(move |index| {
+                let mut fields = [0.0; MAX_FIELDS];
+                let obs = states.state(index).expect("StateIndex is given to finite states only");
+                states.fields(&obs, &mut fields);
+                fields
+            }))
+        }
+        DiscretiserSpec::Bins(dims) => {
+            let bins = Bins::new(dims).expect("checked when the plan was resolved");
+            let base = middle(&env.schema());
+            Some(Box::new(move |cell| {
+                let mut fields = base;
+                bins.centre(cell, &mut fields);
+                fields
+            }))
+        }
+        DiscretiserSpec::Cells { .. } => None,
+    }
+}
+
+/// The variant's shield, if it has one.
+pub(super) fn shield<E: Env>(host: &Host, variant: &Variant, env: &E) -> Option<Shield> {
+    let schema = env.schema();
+    let allowed = variant.allowed.as_ref()?;
+    let allowed = host.callbacks().shield(allowed, env.n_actions(), &schema);
+    Some(Shield::new(schema.fields.len(), env.n_states().unwrap_or(0), allowed))
+}
+
+/// Calls `each(cell, fields)` for every cell with the fields of the state that stands for it; not for
+/// states that cannot be reached, which may be junk.
+pub(super) fn for_each_cell<E: Env + Clone + 'static>(
+    variant: &Variant,
+    env: &E,
+    n_cells: usize,
+    mut each: impl FnMut(usize, &[f64]) -> Result<(), Fault>,
+) -> Result<(), Fault> {
+    let n_fields = env.schema().fields.len();
+    let fields_of = representative(variant, env).expect("refused when the plan was resolved");
+    let reachable = match variant.discretiser {
+        DiscretiserSpec::StateIndex => env.finite().map(|mdp| mdp.reachable()),
+        _ => None,
+    };
+    for cell in 0..n_cells {
+        if reachable.as_ref().is_none_or(|reachable| reachable[cell]) {
+            each(cell, &fields_of(cell)[..n_fields])?;
+        }
+    }
+    Ok(())
+}
+
+/// A number for every cell, called `what` in messages; 0 in states that cannot be reached.
+fn of_state<E: Env + Clone + 'static>(
     host: &Host,
     variant: &Variant,
     env: &E,
     n_cells: usize,
-) -> Result<AnyPotential, Fault> {
-    let Some(callback) = &variant.potential else { return Ok(AnyPotential::No(NoPotential)) };
-    let schema = env.schema();
-    let n_fields = schema.fields.len();
-    let mut phi = host.callbacks().potential(callback, &schema);
-    let potential = match (&variant.discretiser, variant.potential_on) {
-        (DiscretiserSpec::StateIndex, _) => {
-            let states = env.clone();
-            let mut at = move |index: usize| {
-                let mut fields = [0.0; MAX_FIELDS];
-                let obs = states.state(index).expect("StateIndex is given to finite states only");
-                states.fields(&obs, &mut fields);
-                phi(&fields[..n_fields])
+    callback: &Callback,
+    what: &'static str,
+) -> Result<Vec<f64>, Fault> {
+    let mut number = host.callbacks().of_action(callback, what, &env.schema());
+    let mut values = vec![0.0; n_cells];
+    for_each_cell(variant, env, n_cells, |cell, fields| {
+        values[cell] = number(fields, 0)?;
+        Ok(())
+    })?;
+    Ok(values)
+}
+
+/// A number for every cell and action, shape `[n_cells, n_actions]`, called `what` in messages;
+/// 0 in states that cannot be reached.
+pub(super) fn of_action<E: Env + Clone + 'static>(
+    host: &Host,
+    variant: &Variant,
+    env: &E,
+    n_cells: usize,
+    callback: &Callback,
+    what: &'static str,
+) -> Result<Vec<f64>, Fault> {
+    let mut number = host.callbacks().of_action(callback, what, &env.schema());
+    let n_actions = env.n_actions();
+    let mut values = vec![0.0; n_cells * n_actions];
+    for_each_cell(variant, env, n_cells, |cell, fields| {
+        let row = &mut values[cell * n_actions..][..n_actions];
+        let of_state = if callback.arity == 1 { Some(number(fields, 0)?) } else { None };
+        for (action, value) in row.iter_mut().enumerate() {
+            *value = match of_state {
+                Some(value) => value,
+                None => number(fields, action)?,
             };
-            // Reachable states at once, so that a mistake shows before training; the others, which
-            // may be junk, never. Without a model nobody knows which those are.
-            let reachable = env.finite().map(|mdp| mdp.reachable()).unwrap_or_default();
-            let mut table = vec![f64::NAN; n_cells];
-            for (index, _) in reachable.iter().enumerate().filter(|(_, r)| **r) {
-                table[index] = at(index)?;
-            }
-            CellPotential::partial(table, Box::new(at))
         }
-        (DiscretiserSpec::Bins(dims), PhiOn::Cell) => {
-            let bins = Bins::new(dims).expect("checked when the plan was resolved");
-            let base = middle(&schema);
-            CellPotential::new(
-                n_cells,
-                Box::new(move |cell| {
-                    let mut fields = base;
-                    bins.centre(cell, &mut fields);
-                    phi(&fields[..n_fields])
-                }),
-            )
-        }
-        _ => return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi))),
-    };
-    Ok(AnyPotential::Cell(potential))
+        Ok(())
+    })?;
+    Ok(values)
+}
+
+/// A variant's reward model, asked step by step.
+pub(super) fn scripted_reward<E: Env>(host: &Host, variant: &Variant, env: &E) -> AnyReward<E> {
+    if variant.reward.is_none() && variant.terms.is_empty() {
+        return AnyReward::Native(NativeReward);
+    }
+    let terms: Vec<Callback> = variant.terms.values().cloned().collect();
+    let reward = host.callbacks().reward(variant.reward.as_ref(), &terms, &env.schema());
+    AnyReward::Scripted(ScriptedReward::<E>(reward))
 }
 
 /// A variant's reward model. On finite environments it is tabulated, unless it reads `t.step`.
@@ -75,18 +148,14 @@ pub(super) fn reward<E: Env + Clone + 'static>(
     variant: &Variant,
     env: &E,
 ) -> Result<AnyReward<E>, Fault> {
-    if variant.reward.is_none() && variant.terms.is_empty() {
+    let AnyReward::Scripted(mut scripted) = scripted_reward(host, variant, env) else {
         return Ok(AnyReward::Native(NativeReward));
-    }
-    let schema = env.schema();
-    let terms: Vec<Callback> = variant.terms.values().cloned().collect();
+    };
     let callbacks = host.callbacks();
-    let mut scripted =
-        ScriptedReward::<E>(callbacks.reward(variant.reward.as_ref(), &terms, &schema));
     // Over several frames the last outcome alone does not determine the reward.
     if let (Some(mdp), 1) = (env.finite(), variant.frame_skip) {
         callbacks.clear_step_read();
-        let table = tabulate(env, mdp, terms.len(), &mut scripted)?;
+        let table = tabulate(env, mdp, variant.terms.len(), &mut scripted)?;
         if !callbacks.step_read() {
             return Ok(AnyReward::Tabulated(table));
         }
@@ -205,34 +274,69 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
     };
     let mut phi = vec![0.0; mdp.n_states()];
     let mut potential = potential(host, variant, env, mdp.n_states())?;
+    // A potential that changes is what it is at the end.
+    Potential::<E>::begin_episode(&mut potential, variant.episodes);
     for s in (0..mdp.n_states()).filter(|&s| reachable[s]) {
         let obs = env.state(s).expect("a finite environment");
         phi[s] = potential.phi(env, s, &obs)?;
     }
+    let base = playable(host, variant, env, base)?;
     let shaped = shaped_model(&base, variant.agent.float("gamma"), &phi);
     Ok(LearnedModel { shaped, phi })
 }
 
-/// The variant's agent for one seed, and a planner's largest change per sweep.
+/// An agent, and what is known about what it does.
+pub(super) struct Assembled {
+    pub(super) agent: AnyAgent,
+    /// How a planner came to its solution; empty for learners.
+    pub(super) sweeps: Vec<Sweep>,
+    /// What a predictor should learn, where there is a model.
+    pub(super) exact: Option<Exact>,
+}
+
+/// The variant's agent for one seed.
 pub(super) fn agent<E: Env + Clone + 'static>(
     host: &Host,
     variant: &Variant,
     env: &E,
     n_cells: usize,
     seed: u64,
-) -> Result<(AnyAgent, Vec<f64>), Fault> {
+) -> Result<Assembled, Fault> {
     match variant.agent.spec.build {
-        Build::Learner(build) => {
-            let stream = Stream::new(seed, "agent");
-            Ok((build(&variant.agent, n_cells, env.n_actions(), stream), Vec::new()))
+        Build::Learner(build)
+        | Build::Predictor(build)
+        | Build::OnPolicy(build)
+        | Build::OneStep { build, .. } => {
+            let function = |name: &str| variant.agent_functions.get(name);
+            let initial_q = function("initial_q")
+                .map(|f| of_action(host, variant, env, n_cells, f, "the initial action value"));
+            let initial_v = function("initial_v")
+                .map(|f| of_state(host, variant, env, n_cells, f, "the initial state value"));
+            let (mut policy, mut exact) = (None, None);
+            if variant.agent.is_predictor() {
+                policy = given_policy(host, variant, env, n_cells)?;
+                exact = Exact::new(host, variant, env, policy.as_deref())?;
+            }
+            let setup = Setup {
+                n_states: n_cells,
+                n_actions: env.n_actions(),
+                seed,
+                stream: Stream::new(seed, "agent"),
+                initial_q: initial_q.transpose()?,
+                initial_v: initial_v.transpose()?,
+                policy,
+            };
+            let agent = learner(host, variant, env, build, setup)?;
+            Ok(Assembled { agent, sweeps: Vec::new(), exact })
         }
         Build::Planner(build) => {
             let planner = build(&variant.agent);
             let model = learned_model(host, variant, env)?;
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
             let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
-            let sweeps = solution.changes.clone();
-            Ok((AnyAgent::Planned(PlannedAgent::new(solution, planner.gamma())), sweeps))
+            let sweeps = solution.sweeps(planner.gamma());
+            let agent = AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma()));
+            Ok(Assembled { agent, sweeps, exact: None })
         }
     }
 }

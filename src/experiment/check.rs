@@ -17,9 +17,13 @@ const STEPS: u32 = 200;
 pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
     let host = Host::open(plan)?;
     for variant in &plan.variants {
-        let scripted = variant.potential.is_some()
+        let scripted = variant.is_shaped()
+            || variant.allowed.is_some()
+            || !variant.agent_functions.is_empty()
             || variant.reward.is_some()
             || !variant.terms.is_empty()
+            || variant.allowed.is_some()
+            || !variant.agent_functions.is_empty()
             || matches!(variant.discretiser, crate::script::DiscretiserSpec::Cells { .. });
         if !scripted {
             continue;

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::audit::{Audit, audit_variant};
 use super::hex;
-use super::record::UnitRecord;
+use super::record::{StateValues, UnitRecord};
 use super::unit::{UnitError, run_unit};
 use crate::env::EnvVisitor;
 use crate::learn::{QTable, greedy_sets};
@@ -43,8 +43,7 @@ pub fn text(plan: &Plan) -> Result<String, Diagnostic> {
 const MEMORY: &str = "writing to a string does not fail";
 
 fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diagnostic> {
-    let params: Vec<String> =
-        variant.agent.params.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+    let params: Vec<String> = variant.agent.in_effect().map(|(k, v)| format!("{k}: {v}")).collect();
     writeln!(out, "\nvariant {}", variant.name).expect(MEMORY);
     let kwargs = serde_json::Value::Object(variant.config.kwargs.clone());
     writeln!(out, "  env {} {kwargs}", variant.env.id).expect(MEMORY);
@@ -52,7 +51,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         writeln!(out, "  {line}").expect(MEMORY);
     }
     writeln!(out, "  agent {}({})", variant.agent.spec.name, params.join(", ")).expect(MEMORY);
-    let audit = audit_variant(host, variant)?;
+    let audit = audit_variant(host, variant, None)?;
     exact(&audit, out);
     let look = look(variant)?;
     for (i, &seed) in variant.seeds.0.iter().enumerate() {
@@ -63,6 +62,9 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         };
         writeln!(out, "  seed {seed}").expect(MEMORY);
         returns(variant, &record, out);
+        if let Some(values) = &record.values {
+            state_values(&record, values, out);
+        }
         if let Some(q) = &record.q {
             let sets = greedy_sets(q);
             writeln!(out, "    greedy sets {} of {} states", digest(&sets), sets.len())
@@ -79,7 +81,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
 
 fn exact(audit: &Audit, out: &mut String) {
     writeln!(out, "  shaping {}: {}", audit.label(), audit.basis).expect(MEMORY);
-    if let Some(exact) = &audit.exact {
+    if let Some(exact) = audit.preservation() {
         let holds = if exact.identity_holds() { "holds" } else { "does not hold" };
         writeln!(
             out,
@@ -102,6 +104,17 @@ fn returns(variant: &Variant, record: &UnitRecord, out: &mut String) {
     });
     writeln!(out, "    return {}", points.join(", ")).expect(MEMORY);
     writeln!(out, "    steps {}", record.steps()).expect(MEMORY);
+}
+
+/// What a predictor learned: its error, where it is known, and a digest of the values.
+fn state_values(record: &UnitRecord, values: &StateValues, out: &mut String) {
+    if let Some(error) = record.rows.last().and_then(|row| row.value_error) {
+        writeln!(out, "    value error {error:.6}").expect(MEMORY);
+    }
+    let mut hash = Sha256::new();
+    values.v.iter().for_each(|v| hash.update(v.to_bits().to_le_bytes()));
+    let digest = hex(&hash.finalize()[..8]);
+    writeln!(out, "    values {digest} of {} states", values.v.len()).expect(MEMORY);
 }
 
 /// Pins every set without listing them all.

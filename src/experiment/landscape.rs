@@ -2,6 +2,7 @@
 //! in, and to Φ there. Serves pictures and play, which are outside of training.
 
 use super::assemble::{diagnostic_of, middle};
+use super::shaped;
 use crate::env::{EnvVisitor, Session};
 use crate::mdp::{Env, MAX_FIELDS, Schema};
 use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
@@ -57,6 +58,8 @@ pub struct Landscape {
     pub states: Option<Vec<ListedState>>,
     locate: Locate,
     phi: Option<PhiFn>,
+    /// In which episode Φ is taken.
+    last_episode: u32,
     /// Whether Φ is taken at the cell's representative, as in training.
     on_cell: bool,
 }
@@ -72,13 +75,14 @@ impl Landscape {
         let schema = env.schema();
         let by_index = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
         let locate = Locate::new(host, variant, &schema);
-        let phi = variant.potential.as_ref().map(|phi| host.callbacks().potential(phi, &schema));
+        let phi = shaped::phi(host, variant, &schema);
         Ok(Self {
             states: by_index.then(|| env.visit(ListStates)),
             on_cell: matches!(locate, Locate::Bins(_)) && variant.potential_on == PhiOn::Cell,
             schema,
             locate,
             phi,
+            last_episode: variant.episodes,
         })
     }
 
@@ -100,7 +104,8 @@ impl Landscape {
         }
     }
 
-    /// Φ as the learner meets it in a state of `cell` with these fields; `None` without one.
+    /// Φ as the learner meets it, at the end of training, in a state of `cell` with these fields;
+    /// `None` without one. What the learner's own values add to it is not in it.
     ///
     /// # Errors
     /// If the callback fails.
@@ -115,7 +120,7 @@ impl Landscape {
             }
             _ => state[..n_fields].copy_from_slice(fields),
         }
-        phi(&state[..n_fields]).map(Some).map_err(diagnostic_of)
+        phi(&state[..n_fields], self.last_episode).map(Some).map_err(diagnostic_of)
     }
 }
 

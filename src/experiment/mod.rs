@@ -5,7 +5,7 @@
 //! - [`execute`]: all units of a plan on threads, skipping those already stored
 //! - [`Store`]: one immutable folder per unit, committed by an atomic rename
 //! - [`check`]: calls every callback on sampled states before anything is run
-//! - [`audit_variant`]: what can be said exactly about a variant's shaping
+//! - [`audit_variant`]: what can be said about a variant's shaping
 //! - [`play`]: the greedy policy of a stored unit at play; [`Landscape`]: what it says of states
 //! - [`golden`]: a small text that pins down what a script learns
 
@@ -16,7 +16,12 @@ mod execute;
 pub mod golden;
 mod landscape;
 pub mod play;
+mod predict;
 mod record;
+mod score;
+mod shaped;
+mod shielded;
+mod starts;
 mod store;
 mod train;
 mod unit;
@@ -30,11 +35,16 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-pub use audit::{Audit, audit_variant};
+pub use audit::{
+    Audit, AuditVerdict, Continuous, Exact, Naming, SampledModel, Thorough, TrueReturn,
+    audit_variant,
+};
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use landscape::{Landscape, ListedState};
-pub use record::{EpisodeRow, Learned, UnitRecord};
+pub use predict::has_exact_values;
+pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
+pub use score::{Scored, score_variant};
 pub use store::{
     Store, StoreError, StoredUnit, read_table, write_atomically, write_atomically_with,
 };

@@ -2,22 +2,24 @@
 //!
 //! An episode is played in a [`Session`], under the variant's time limit. Its states go through
 //! the variant's discretiser, and the action is the first within the tie tolerance of the best
-//! ([`argmax_tol`]). Where nothing was learned all values are the initial one, so that the first
+//! among those that the shield allows ([`argmax_allowed`]). Where nothing was learned all values are the initial one, so that the first
 //! action is played, which is what greedy choice did in training too. An action is repeated for as
 //! many steps as the variant's `frame_skip` says.
 
 use super::landscape::Locate;
 use crate::env::rollout::{Event, Length, RolloutError, drive};
 use crate::env::{EnvError, PlayedAction, Session};
-use crate::learn::{QTable, argmax_tol};
+use crate::learn::{QTable, argmax_allowed};
 use crate::mdp::numpy::Seed;
 use crate::mdp::{Action, Ending};
 use crate::script::{Host, Variant};
+use crate::shaping::{ActionSet, Fault, ShieldFn, Shielded};
 
 /// A greedy policy over a table.
 pub struct Policy {
     locate: Locate,
     q: QTable,
+    shield: Option<ShieldFn>,
     /// For how many steps an action is played.
     frame_skip: u32,
     /// The action that is played now.
@@ -28,22 +30,31 @@ impl Policy {
     /// The policy of `variant` that is greedy with respect to `q`, a table of its units.
     pub fn new(host: &Host, variant: &Variant, session: &Session, q: QTable) -> Self {
         let locate = Locate::new(host, variant, session.schema());
-        Self { locate, q, frame_skip: variant.frame_skip, held: 0 }
+        let shield = variant
+            .allowed
+            .as_ref()
+            .map(|allowed| host.callbacks().shield(allowed, q.n_actions(), session.schema()));
+        Self { locate, q, shield, frame_skip: variant.frame_skip, held: 0 }
     }
 
     /// The policy of a table that has one row per state of a finite environment.
     pub fn of_states(q: QTable) -> Self {
-        Self { locate: Locate::Index, q, frame_skip: 1, held: 0 }
+        Self { locate: Locate::Index, q, shield: None, frame_skip: 1, held: 0 }
     }
 
     /// The action for the session's present state.
     ///
     /// # Errors
-    /// If a scripted discretiser fails.
+    /// If a scripted discretiser or shield fails.
     pub fn action(&mut self, session: &Session) -> Result<PlayedAction, RolloutError> {
         if session.elapsed().is_multiple_of(self.frame_skip) {
-            let cell = self.locate.present(session).map_err(|f| RolloutError::Policy(f.0))?;
-            self.held = argmax_tol(self.q.row(cell));
+            let failed = |f: Fault| RolloutError::Policy(f.0);
+            let cell = self.locate.present(session).map_err(failed)?;
+            let allowed = match &mut self.shield {
+                Some(shield) => shield(session.fields()).map_err(failed)?,
+                None => ActionSet::ALL,
+            };
+            self.held = argmax_allowed(self.q.row(cell), Shielded { cell, allowed });
         }
         Ok(session.action(self.held))
     }

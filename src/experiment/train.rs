@@ -3,7 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::record::EpisodeRow;
-use crate::learn::{Agent, Last};
+use super::starts::Starts;
+use crate::learn::{Last, Learn, Seen};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Ending, Env, Step};
 use crate::shaping::{Discretiser, Fault, Potential, RewardModel, Transition, potential_term};
@@ -34,12 +35,21 @@ pub struct Limits {
     pub frame_skip: u32,
     /// The range to which the learned reward is clipped before the potential's part is added.
     pub clip_reward: Option<[f64; 2]>,
+    /// Draws the first state of every episode from all that the environment's model can reach, by
+    /// a stream of this seed, instead of the environment's own.
+    pub exploring_starts: Option<u64>,
 }
 
 impl Limits {
     /// One episode without a time limit, and nothing out of the ordinary.
-    pub const EPISODE: Self =
-        Self { episodes: 1, max_steps: None, n_terms: 0, frame_skip: 1, clip_reward: None };
+    pub const EPISODE: Self = Self {
+        episodes: 1,
+        max_steps: None,
+        n_terms: 0,
+        frame_skip: 1,
+        clip_reward: None,
+        exploring_starts: None,
+    };
 }
 
 /// Why training ended early.
@@ -67,11 +77,13 @@ pub enum TrainError {
 /// Steps between looks at the stop flag in an endless episode.
 const STOP_INTERVAL: u32 = 1 << 16;
 
-/// Plays `limits.episodes` episodes, teaching `agent`; calls `each` after every one.
+/// Plays `limits.episodes` episodes, teaching `agent`; calls `each` after every one,
+/// with the agent as it is by then.
 ///
 /// The reward learned from is `reward(t) + γΦ(s′) − Φ(s)`, with Φ(s′) = 0 on termination. On
 /// truncation Φ(s′) is kept if and only if the agent bootstraps from s′: both sides must speak of
-/// the same continuation, or the fixed point moves.
+/// the same continuation, or the fixed point moves. What the agent adds itself
+/// ([`Agent::shaping`](crate::learn::Agent::shaping)) is counted with it.
 ///
 /// # Errors
 /// If a callback fails, returns stop being finite, or `stop` is raised.
@@ -81,22 +93,24 @@ pub fn train<E, D, P, R, A>(
     limits: Limits,
     rng: &mut NumpyRng,
     stop: &AtomicBool,
-    mut each: impl FnMut(EpisodeRow),
+    mut each: impl FnMut(EpisodeRow, &A),
 ) -> Result<(), TrainError>
 where
     E: Env,
     D: Discretiser<E>,
     P: Potential<E>,
     R: RewardModel<E>,
-    A: Agent,
+    A: Learn<D::State>,
 {
+    let mut starts = limits.exploring_starts.and_then(|seed| Starts::new(&world.env, seed));
     for episode in 0..limits.episodes {
         if stop.load(Ordering::Relaxed) {
             return Err(TrainError::Interrupted);
         }
-        match play(world, agent, limits, rng, stop) {
+        world.potential.begin_episode(episode + 1);
+        match play(world, agent, limits, starts.as_mut(), rng, stop) {
             Ok(row) if !row.learned.is_finite() => return Err(TrainError::NotFinite { episode }),
-            Ok(row) => each(row),
+            Ok(row) => each(row, agent),
             Err((None, _)) => return Err(TrainError::Interrupted),
             Err((Some(fault), step)) => return Err(TrainError::Fault { fault, episode, step }),
         }
@@ -133,6 +147,7 @@ fn play<E, D, P, R, A>(
     world: &mut World<E, D, P, R>,
     agent: &mut A,
     limits: Limits,
+    starts: Option<&mut Starts>,
     rng: &mut NumpyRng,
     stop: &AtomicBool,
 ) -> Result<EpisodeRow, (Option<Fault>, u32)>
@@ -141,7 +156,7 @@ where
     D: Discretiser<E>,
     P: Potential<E>,
     R: RewardModel<E>,
-    A: Agent,
+    A: Learn<D::State>,
 {
     let World { env, discretiser, potential, reward } = world;
     let max_steps = limits.max_steps.unwrap_or(u32::MAX);
@@ -152,9 +167,12 @@ where
     let (mut native, mut learned, mut shaping) = (0.0, 0.0, 0.0);
 
     let mut obs = env.reset(rng);
-    let cell = discretiser.cell(env, &obs).map_err(|f| (Some(f), 0))?;
-    let mut phi = potential.phi(env, cell, &obs).map_err(|f| (Some(f), 0))?;
-    let mut action = agent.begin(cell);
+    if let Some(starts) = starts {
+        obs = starts.place(env);
+    }
+    let start = discretiser.see(env, &obs).map_err(|f| (Some(f), 0))?;
+    let mut phi = potential.phi(env, start.cell(), &obs).map_err(|f| (Some(f), 0))?;
+    let mut action = agent.begin(start);
     // Steps of the agent, and of the environment.
     let (mut step, mut frames) = (0u32, 0u32);
     loop {
@@ -166,7 +184,6 @@ where
             frames += repeat(env, action, left, &mut s, rng);
         }
         let truncated = !s.terminated && frames >= max_steps;
-        let next = discretiser.cell(env, &s.obs).map_err(failed)?;
         let t = Transition {
             state: &obs,
             action,
@@ -180,11 +197,15 @@ where
         if let Some([low, high]) = limits.clip_reward {
             r = r.clamp(low, high);
         }
+        // A terminal state is seen by nobody: scripts need not have a cell or an action for it.
+        let next =
+            if s.terminated { None } else { Some(discretiser.see(env, &s.obs).map_err(failed)?) };
         if P::ACTIVE {
-            let phi_next = if s.terminated || (truncated && !keep_truncated) {
-                0.0
-            } else {
-                potential.phi(env, next, &s.obs).map_err(failed)?
+            let phi_next = match next {
+                Some(next) if keep_truncated || !truncated => {
+                    potential.phi(env, next.cell(), &s.obs).map_err(failed)?
+                }
+                _ => 0.0,
             };
             let f = potential_term(gamma, phi, phi_next);
             r += f;
@@ -194,23 +215,29 @@ where
         native += s.reward;
         learned += r;
         step += 1;
-        if s.terminated || truncated {
-            let (last, ending) = if s.terminated {
-                (Last::Terminated, Ending::Terminated)
-            } else {
-                (Last::Truncated(next), Ending::Truncated)
-            };
-            agent.end(r, last);
-            return Ok(EpisodeRow {
-                steps: step,
-                native,
-                learned,
-                shaping,
-                terms,
-                epsilon,
-                ending,
-            });
-        }
+        let next = match next {
+            Some(next) if !truncated => next,
+            last => {
+                let (last, ending) = match last {
+                    None => (Last::Terminated, Ending::Terminated),
+                    Some(next) => (Last::Truncated(next), Ending::Truncated),
+                };
+                agent.end(r, last);
+                let own = agent.shaping();
+                learned += own;
+                shaping += own;
+                return Ok(EpisodeRow {
+                    steps: step,
+                    native,
+                    learned,
+                    shaping,
+                    terms,
+                    epsilon,
+                    ending,
+                    value_error: None,
+                });
+            }
+        };
         if step.is_multiple_of(STOP_INTERVAL) && stop.load(Ordering::Relaxed) {
             return Err((None, step));
         }

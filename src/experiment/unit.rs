@@ -4,23 +4,30 @@ use std::sync::atomic::AtomicBool;
 
 use sha2::{Digest, Sha256};
 
-use super::record::{EpisodeRow, UnitRecord};
+use super::assemble::Assembled;
+use super::predict::Exact;
+use super::record::{EpisodeRow, StateValues, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
-use super::{assemble, hex};
+use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
-use crate::learn::registry::AgentVisitor;
-use crate::learn::{Agent, AnyAgent};
+use crate::learn::planning::Sweep;
+use crate::learn::registry::{AgentVisitor, TabularAgent};
+use crate::learn::{AnyAgent, Learn};
 use crate::mdp::Env;
 use crate::mdp::numpy::NumpyRng;
 use crate::script::{Diagnostic, DiscretiserSpec, Host, Plan, Variant};
 use crate::shaping::{
-    AnyPotential, AnyReward, Bins, Discretiser, Fault, NativeReward, NoPotential, Potential,
-    RewardModel, ScriptedCells, StateIndex,
+    AnyCells, AnyPotential, AnyReward, Bins, Discretiser, Fault, NativeReward, NoPotential,
+    Potential, RewardModel, ScriptedCells, ShieldedCells, StateIndex,
 };
 
 /// Raised whenever the same configuration gives other results than before: old units are then not
 /// taken for new ones.
-pub const SEMANTICS: u32 = 1;
+pub const SEMANTICS: u32 = 2;
+
+/// Whether the commonest combinations get loops of their own. Not when debugging: they are most of
+/// what there is to compile, and the shared loop gives the same results.
+const OWN_LOOPS: bool = !cfg!(debug_assertions);
 
 /// A unit of work.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -122,111 +129,166 @@ impl EnvVisitor for RunUnit<'_> {
     type Out = Result<UnitRecord, UnitError>;
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
-        match &self.variant.discretiser {
+        let (host, variant) = (self.host, self.variant);
+        let shield = assemble::shield(host, variant, &env);
+        let cells = match &variant.discretiser {
             DiscretiserSpec::StateIndex => {
-                if const { E::INDEXED } {
-                    let n_states = env.n_states().unwrap_or(0);
-                    self.with_discretiser(env, StateIndex { n_states })
-                } else {
-                    unreachable!("a plan is resolved with the discretiser that its states need")
+                let index = StateIndex { n_states: env.n_states().unwrap_or(0) };
+                if const { OWN_LOOPS && E::INDEXED } && shield.is_none() {
+                    return self.fast(env, index);
                 }
+                AnyCells::Index(index)
             }
             DiscretiserSpec::Bins(dims) => {
                 let bins = Bins::new(dims).expect("checked when the plan was resolved");
-                self.with_discretiser(env, bins)
+                if const { OWN_LOOPS && !E::INDEXED } && shield.is_none() {
+                    return self.fast(env, bins);
+                }
+                AnyCells::Bins(bins)
             }
             DiscretiserSpec::Cells { shape, cell } => {
                 let schema = env.schema();
-                let cell =
-                    self.host.callbacks().cells(cell, shape, &self.variant.normalise, &schema);
+                let cell = host.callbacks().cells(cell, shape, &variant.normalise, &schema);
                 let n_cells = shape.iter().product();
-                let cells = ScriptedCells::new(n_cells, schema.fields.len(), cell);
-                self.with_discretiser(env, cells)
+                AnyCells::Scripted(ScriptedCells::new(n_cells, schema.fields.len(), cell))
             }
+        };
+        match shield {
+            None => self.shared(env, cells),
+            Some(shield) => self.shared(env, ShieldedCells { cells, shield }),
         }
     }
 }
 
+/// What a variant trains with, apart from its environment and discretiser.
+struct Parts<E: Env> {
+    potential: AnyPotential,
+    reward: AnyReward<E>,
+    agent: AnyAgent,
+    /// What else the unit leaves behind.
+    extra: Extra,
+}
+
+/// What a unit knows about its agent beyond what it learns.
+struct Extra {
+    sweeps: Vec<Sweep>,
+    exact: Option<Exact>,
+}
+
 impl RunUnit<'_> {
-    /// Plain and potential-only runs get loops of their own, if the discretiser is fast; other
-    /// combinations share one.
-    fn with_discretiser<E, D>(self, env: E, discretiser: D) -> Result<UnitRecord, UnitError>
+    fn parts<E: Env + Clone + 'static>(
+        &self,
+        env: &E,
+        n_cells: usize,
+    ) -> Result<Parts<E>, UnitError> {
+        let (host, variant, seed) = (self.host, self.variant, self.seed);
+        let fault = |f| UnitError::fault(variant, seed, f);
+        let potential = shaped::potential(host, variant, env, n_cells).map_err(fault)?;
+        let reward = assemble::reward(host, variant, env).map_err(fault)?;
+        let Assembled { agent, sweeps, exact } =
+            assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;
+        Ok(Parts { potential, reward, agent, extra: Extra { sweeps, exact } })
+    }
+
+    /// The commonest agents have loops of their own, for plain and potential-only rewards and for
+    /// others, where the discretiser is fast.
+    fn fast<E, D>(self, env: E, discretiser: D) -> Result<UnitRecord, UnitError>
+    where
+        E: Env + Clone + 'static,
+        D: Discretiser<E, State = usize>,
+    {
+        let Parts { potential, reward, agent, extra } = self.parts(&env, discretiser.n_cells())?;
+        if !agent.is_fast() {
+            let world = World { env, discretiser, potential, reward };
+            return self.train(world, agent.boxed(), extra);
+        }
+        let unit = (self, extra);
+        match (potential, reward) {
+            (AnyPotential::No(_), AnyReward::Native(_)) => {
+                let (potential, reward) = (NoPotential, NativeReward);
+                agent.visit(Train { unit, world: World { env, discretiser, potential, reward } })
+            }
+            (AnyPotential::Cell(potential), AnyReward::Native(reward)) => {
+                agent.visit(Train { unit, world: World { env, discretiser, potential, reward } })
+            }
+            (potential, reward) => {
+                agent.visit(Train { unit, world: World { env, discretiser, potential, reward } })
+            }
+        }
+    }
+
+    /// One loop for every agent, potential and reward.
+    fn shared<E, D>(self, env: E, discretiser: D) -> Result<UnitRecord, UnitError>
     where
         E: Env + Clone + 'static,
         D: Discretiser<E>,
+        Box<dyn TabularAgent>: Learn<D::State>,
     {
-        let (host, variant, seed) = (self.host, self.variant, self.seed);
-        let fault = |f| UnitError::fault(variant, seed, f);
-        let n_cells = discretiser.n_cells();
-        let potential = assemble::potential(host, variant, &env, n_cells).map_err(fault)?;
-        let reward = assemble::reward(host, variant, &env).map_err(fault)?;
-        let (agent, sweeps) = assemble::agent(host, variant, &env, n_cells, seed).map_err(fault)?;
-        let mut record = if const { D::FAST } {
-            match (potential, reward) {
-                (AnyPotential::No(_), AnyReward::Native(_)) => {
-                    let (potential, reward) = (NoPotential, NativeReward);
-                    self.with_agent(World { env, discretiser, potential, reward }, agent)
-                }
-                (AnyPotential::Cell(potential), AnyReward::Native(reward)) => {
-                    self.with_agent(World { env, discretiser, potential, reward }, agent)
-                }
-                (potential, reward) => {
-                    self.with_agent(World { env, discretiser, potential, reward }, agent)
-                }
-            }
-        } else {
-            self.with_agent(World { env, discretiser, potential, reward }, agent)
-        }?;
-        record.sweeps = sweeps;
-        Ok(record)
+        let Parts { potential, reward, agent, extra } = self.parts(&env, discretiser.n_cells())?;
+        self.train(World { env, discretiser, potential, reward }, agent.boxed(), extra)
     }
 
-    fn with_agent<E, D, P, R>(
+    fn train<E, D, P, R, A>(
         self,
-        world: World<E, D, P, R>,
-        agent: AnyAgent,
+        mut world: World<E, D, P, R>,
+        mut agent: A,
+        extra: Extra,
     ) -> Result<UnitRecord, UnitError>
     where
         E: Env,
         D: Discretiser<E>,
         P: Potential<E>,
         R: RewardModel<E>,
+        A: Learn<D::State>,
     {
-        agent.visit(Train { unit: self, world })
-    }
-}
-
-struct Train<'a, E, D, P, R> {
-    unit: RunUnit<'a>,
-    world: World<E, D, P, R>,
-}
-
-impl<E, D, P, R> AgentVisitor for Train<'_, E, D, P, R>
-where
-    E: Env,
-    D: Discretiser<E>,
-    P: Potential<E>,
-    R: RewardModel<E>,
-{
-    type Out = Result<UnitRecord, UnitError>;
-
-    fn visit<A: Agent>(self, mut agent: A) -> Self::Out {
-        let RunUnit { variant, seed, stop, each, .. } = self.unit;
-        let mut world = self.world;
+        let RunUnit { variant, seed, stop, each, .. } = self;
         let limits = Limits {
             episodes: variant.episodes,
             max_steps: variant.max_steps,
             n_terms: variant.terms.len(),
             frame_skip: variant.frame_skip,
             clip_reward: variant.clip_reward,
+            exploring_starts: variant.agent.is_on("exploring_starts").then_some(seed),
         };
+        let Extra { sweeps, exact } = extra;
+        let spacing = exact.as_ref().map_or(0, |exact| exact.spacing(limits.episodes));
         let mut rng = NumpyRng::from_u64(seed);
         let mut rows: Vec<EpisodeRow> = Vec::with_capacity(limits.episodes as usize);
-        train(&mut world, &mut agent, limits, &mut rng, stop, |row| {
+        train(&mut world, &mut agent, limits, &mut rng, stop, |mut row, agent| {
             each(row.steps);
+            if let (Some(exact), Some(v)) = (&exact, agent.v()) {
+                let episode = rows.len() as u32;
+                let due = episode % spacing == 0 || episode + 1 == limits.episodes;
+                row.value_error = due.then(|| exact.error(v));
+            }
             rows.push(row);
         })
         .map_err(|e| UnitError::train(variant, seed, e))?;
-        Ok(UnitRecord { rows, q: agent.q().cloned(), sweeps: Vec::new() })
+        let q = agent.q().cloned();
+        let values = agent.v().filter(|_| q.is_none()).map(|v| StateValues {
+            v: v.to_vec(),
+            exact: exact.map_or_else(Vec::new, |exact| exact.v),
+        });
+        Ok(UnitRecord { rows, q, values, sweeps })
+    }
+}
+
+struct Train<'a, E, D, P, R> {
+    unit: (RunUnit<'a>, Extra),
+    world: World<E, D, P, R>,
+}
+
+impl<E, D, P, R> AgentVisitor for Train<'_, E, D, P, R>
+where
+    E: Env,
+    D: Discretiser<E, State = usize>,
+    P: Potential<E>,
+    R: RewardModel<E>,
+{
+    type Out = Result<UnitRecord, UnitError>;
+
+    fn visit<A: Learn<usize>>(self, agent: A) -> Self::Out {
+        let (unit, extra) = self.unit;
+        unit.train(self.world, agent, extra)
     }
 }

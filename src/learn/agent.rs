@@ -2,30 +2,19 @@
 
 use super::QTable;
 use crate::mdp::Action;
+pub use crate::shaping::Seen;
 
 /// The last state of an episode, as far as learning is concerned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Last {
+pub enum Last<S = usize> {
     /// The state is terminal: nothing is bootstrapped from it.
     Terminated,
     /// The time limit cut the episode off in this state, which still has a value.
-    Truncated(usize),
+    Truncated(S),
 }
 
-/// A learner over states `0..n_states`.
-///
-/// The loop calls [`Self::begin`] once per episode, [`Self::step`] after every step that goes on,
-/// and [`Self::end`] after the last one. The agent remembers its own (s, a).
+/// What there is to know of an agent besides how it acts.
 pub trait Agent {
-    /// Starts an episode in state `s` and returns the first action.
-    fn begin(&mut self, s: usize) -> Action;
-
-    /// Learns from `reward` and the arrival in `next`; returns the action to play there.
-    fn step(&mut self, reward: f64, next: usize) -> Action;
-
-    /// Learns from the last `reward` of the episode.
-    fn end(&mut self, reward: f64, last: Last);
-
     /// The discount factor γ: shaping uses the agent's own.
     fn gamma(&self) -> f64;
 
@@ -38,4 +27,78 @@ pub trait Agent {
 
     /// The action values learned so far, if the agent keeps any.
     fn q(&self) -> Option<&QTable>;
+
+    /// The state values learned so far, one per state, if that is what the agent learns.
+    fn v(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// What the agent itself added to its rewards, summed over the episode that has ended: the
+    /// part of a shaping that needs to know which action is bootstrapped from, or what has been
+    /// learned so far.
+    fn shaping(&self) -> f64 {
+        0.0
+    }
+}
+
+/// Playing and learning, over states of type `S`.
+///
+/// The loop calls [`Self::begin`] once per episode, [`Self::step`] after every step that goes on,
+/// and [`Self::end`] after the last one. The agent remembers its own (s, a).
+///
+/// Tabular agents implement it for `usize`, a row of the table, and for
+/// [`Shielded`](crate::shaping::Shielded), a row and the actions allowed there, by one generic
+/// implementation over [`Seen`]; function approximators for [`Fields`](crate::shaping::Fields).
+pub trait Learn<S: Seen>: Agent {
+    /// Starts an episode in state `s` and returns the first action.
+    fn begin(&mut self, s: S) -> Action;
+
+    /// Learns from `reward` and the arrival in `next`; returns the action to play there.
+    fn step(&mut self, reward: f64, next: S) -> Action;
+
+    /// Learns from the last `reward` of the episode.
+    fn end(&mut self, reward: f64, last: Last<S>);
+}
+
+impl<T: Agent + ?Sized> Agent for Box<T> {
+    fn gamma(&self) -> f64 {
+        (**self).gamma()
+    }
+
+    fn bootstraps_when_truncated(&self) -> bool {
+        (**self).bootstraps_when_truncated()
+    }
+
+    fn epsilon(&self) -> f64 {
+        (**self).epsilon()
+    }
+
+    fn q(&self) -> Option<&QTable> {
+        (**self).q()
+    }
+
+    fn v(&self) -> Option<&[f64]> {
+        (**self).v()
+    }
+
+    fn shaping(&self) -> f64 {
+        (**self).shaping()
+    }
+}
+
+impl<S: Seen, T: Learn<S> + ?Sized> Learn<S> for Box<T> {
+    #[inline]
+    fn begin(&mut self, s: S) -> Action {
+        (**self).begin(s)
+    }
+
+    #[inline]
+    fn step(&mut self, reward: f64, next: S) -> Action {
+        (**self).step(reward, next)
+    }
+
+    #[inline]
+    fn end(&mut self, reward: f64, last: Last<S>) {
+        (**self).end(reward, last);
+    }
 }

@@ -1,30 +1,86 @@
-//! Greedy choice with a tolerance, and ε-greedy behaviour.
+//! Greedy choice with a tolerance, and choice among allowed actions.
 //!
 //! Rounding must not decide a tie: potential-based shaping leaves two equally good actions equal
 //! in theory and apart in the last bit in practice, and from there on two learners that are the
-//! same by theorem play different episodes. Values within `1e-9 · max(1, |largest|)` of the
-//! largest count as tied, and the first of the tied is taken.
+//! same by theorem play different episodes. Values within 1e-9 of the largest count as tied, or
+//! within `1e-12 |largest|` if that is more, and the first of the tied is taken.
+//!
+//! Adding a potential to all values of a state must not change what is tied either. Hence the
+//! fixed width up to values of 1000, and above them one that is still hundreds of times what
+//! rounding can add up to: two good actions converge to the same value through every distance,
+//! and a width in proportion to the values would tie them sooner for one learner than for another.
 
 use super::q_table::max;
-use super::{QTable, Schedule, ScheduleState};
+use super::{QTable, Seen};
 use crate::mdp::Action;
-use crate::mdp::streams::Stream;
 
-/// Relative width of a tie.
+/// Width of a tie between values that are not large.
 const TIE: f64 = 1e-9;
+/// Width of a tie between large values, per unit.
+const LARGE_TIE: f64 = 1e-12;
 
-/// The smallest value of a row that counts as tied with its largest.
+/// The smallest value that counts as tied with the largest, `best`.
 #[inline]
-fn threshold(row: &[f64]) -> f64 {
-    let best = max(row);
-    best - TIE * best.abs().max(1.0)
+fn threshold(best: f64) -> f64 {
+    best - (LARGE_TIE * best.abs()).max(TIE)
 }
 
 /// The first action whose value is within the tie tolerance of the largest.
 #[inline]
 pub fn argmax_tol(row: &[f64]) -> Action {
-    let threshold = threshold(row);
+    let threshold = threshold(max(row));
     row.iter().position(|&q| q >= threshold).unwrap_or(0)
+}
+
+/// Whether `action` is within the tie tolerance of the largest value among the actions that `s`
+/// allows.
+#[inline]
+pub(super) fn is_greedy<S: Seen>(row: &[f64], s: S, action: Action) -> bool {
+    row[action] >= threshold(max_allowed(row, s))
+}
+
+/// The largest value among the actions that `s` allows.
+#[inline]
+pub fn max_allowed<S: Seen>(row: &[f64], s: S) -> f64 {
+    if !S::SHIELDED {
+        return max(row);
+    }
+    let mut best = f64::NEG_INFINITY;
+    for (a, &q) in row.iter().enumerate() {
+        if s.allows(a) && q > best {
+            best = q;
+        }
+    }
+    best
+}
+
+/// The first action whose value is the largest among those that `s` allows, to the last bit: what
+/// [`max_allowed`] is the value of.
+#[inline]
+pub(super) fn argmax_exact<S: Seen>(row: &[f64], s: S) -> Action {
+    let best = max_allowed(row, s);
+    (0..row.len()).find(|&a| s.allows(a) && row[a] == best).unwrap_or(0)
+}
+
+/// [`argmax_tol`] among the actions that `s` allows.
+#[inline]
+pub fn argmax_allowed<S: Seen>(row: &[f64], s: S) -> Action {
+    if !S::SHIELDED {
+        return argmax_tol(row);
+    }
+    let threshold = threshold(max_allowed(row, s));
+    (0..row.len()).find(|&a| s.allows(a) && row[a] >= threshold).unwrap_or(0)
+}
+
+/// The action that `u` in [0, 1) picks from those that `s` allows, each with the same probability.
+#[inline]
+pub fn pick_allowed<S: Seen>(n_actions: usize, s: S, u: f64) -> Action {
+    if !S::SHIELDED {
+        return ((u * n_actions as f64) as usize).min(n_actions - 1);
+    }
+    let n = (0..n_actions).filter(|&a| s.allows(a)).count();
+    let k = ((u * n as f64) as usize).min(n.saturating_sub(1));
+    (0..n_actions).filter(|&a| s.allows(a)).nth(k).unwrap_or(0)
 }
 
 /// All actions within the tie tolerance of the largest, in order. `scale` widens the tolerance to
@@ -41,45 +97,6 @@ pub fn greedy_sets(q: &QTable) -> Vec<Vec<Action>> {
     (0..q.n_states()).map(|s| greedy_set(q.row(s), scale)).collect()
 }
 
-/// ε-greedy behaviour. Draws exactly one 64-bit number per choice, whatever comes of it, so that
-/// two learners with the same seed stay on the same stream.
-#[derive(Debug, Clone)]
-pub struct Behaviour {
-    epsilon: ScheduleState,
-    stream: Stream,
-}
-
-impl Behaviour {
-    /// ε by `schedule`, randomness from `stream`.
-    pub fn new(schedule: Schedule, stream: Stream) -> Self {
-        Self { epsilon: ScheduleState::new(schedule), stream }
-    }
-
-    /// Chooses: with probability ε an action uniformly at random, else [`argmax_tol`].
-    #[inline]
-    pub fn choose(&mut self, row: &[f64]) -> Action {
-        let epsilon = self.epsilon.value();
-        let u = self.stream.uniform();
-        self.epsilon.step();
-        if u < epsilon {
-            // Given u < ε, u / ε is uniform in [0, 1): it picks the action without another draw.
-            ((u / epsilon * row.len() as f64) as usize).min(row.len() - 1)
-        } else {
-            argmax_tol(row)
-        }
-    }
-
-    /// ε at present.
-    pub fn epsilon(&self) -> f64 {
-        self.epsilon.value()
-    }
-
-    /// Tells a per-episode schedule that an episode has ended.
-    pub fn end_episode(&mut self) {
-        self.epsilon.end_episode();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,7 +106,8 @@ mod tests {
         assert_eq!(argmax_tol(&[0.0, 0.0, 0.0]), 0);
         assert_eq!(argmax_tol(&[0.3, 0.1 + 0.2, 0.0]), 0, "0.1 + 0.2 is above 0.3 by an ulp only");
         assert_eq!(argmax_tol(&[0.0, 1e-8]), 1);
-        assert_eq!(argmax_tol(&[1e6, 1e6 + 1e-4]), 0, "the tolerance grows with the values");
+        assert_eq!(argmax_tol(&[1e6, 1e6 + 1e-7]), 0, "the tolerance grows with the values");
+        assert_eq!(argmax_tol(&[500.0, 500.0 + 2e-9]), 1, "but not with small ones");
         assert_eq!(argmax_tol(&[-2.0, -1.0, -1.5]), 1);
     }
 
@@ -98,30 +116,5 @@ mod tests {
         assert_eq!(greedy_set(&[1.0, 1.0 + 1e-12, 0.5], 1.0), [0, 1]);
         assert_eq!(greedy_set(&[1.0, 1.0 + 1e-8, 0.5], 1.0), [1]);
         assert_eq!(greedy_set(&[1.0, 1.0 + 1e-8, 0.5], 1e3), [0, 1]);
-    }
-
-    #[test]
-    fn epsilon_greedy_explores_at_the_stated_rate_and_uniformly() {
-        let mut b = Behaviour::new(Schedule::constant(0.4), Stream::new(1, "test"));
-        let mut counts = [0u32; 4];
-        for _ in 0..100_000 {
-            counts[b.choose(&[0.0, 1.0, 0.0, 0.0])] += 1;
-        }
-        // Each other action: 10 %, standard deviation 95; the greedy one 70 %.
-        for a in [0, 2, 3] {
-            assert!((9_400..10_600).contains(&counts[a]), "{counts:?}");
-        }
-        assert!((69_100..70_900).contains(&counts[1]), "{counts:?}");
-    }
-
-    #[test]
-    fn one_draw_per_choice_whatever_the_branch() {
-        let mut explorer = Behaviour::new(Schedule::constant(1.0), Stream::new(3, "test"));
-        let mut miser = Behaviour::new(Schedule::constant(0.0), Stream::new(3, "test"));
-        for _ in 0..100 {
-            explorer.choose(&[0.0, 1.0]);
-            miser.choose(&[0.0, 1.0]);
-        }
-        assert_eq!(explorer.stream.next_u64(), miser.stream.next_u64());
     }
 }

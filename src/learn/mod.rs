@@ -1,32 +1,54 @@
 //! Agents that learn by playing, and planners that solve a model.
 //!
-//! - [`Agent`]: chooses actions and learns from rewards; [`QLearning`], [`Sarsa`], [`RandomAgent`]
+//! - [`Agent`], [`Learn`]: chooses actions and learns from rewards
+//! - [`control`]: agents that learn a table of action values step by step; [`RandomAgent`]
+//! - [`MonteCarlo`], [`OffPolicyMonteCarlo`]: from the returns of whole episodes
+//! - [`prediction`]: the state values of a policy that is given
 //! - [`planning`]: value iteration, policy iteration, exact policy evaluation on a [`FiniteMdp`]
 //! - [`registry`]: the one place where an agent is registered; [`AgentConfig`] is its configuration
-//! - [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what they are made of
+//! - [`Behaviour`], [`StepSize`], [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what
+//!   they are made of
 //!
 //! Agents never log, never see a clock, and know nothing of shaping: they learn from the reward
-//! they are handed.
+//! they are handed. The exceptions are shapings that need what only an agent knows: [`Advised`](control::Advised),
+//! [`LookBack`], [`Bootstrapped`].
 //!
 //! [`FiniteMdp`]: crate::mdp::FiniteMdp
 
 mod agent;
+mod behaviour;
+mod bootstrapped;
+pub mod control;
+mod episode;
 mod greedy;
+mod look_back;
+mod monte_carlo;
+mod off_policy_monte_carlo;
+mod params;
 pub mod planning;
-mod q_learning;
+pub mod prediction;
 mod q_table;
 mod random_agent;
 pub mod registry;
-mod sarsa;
 mod schedule;
-mod tabular;
+mod softmax;
+mod step_size;
+mod ucb;
 
-pub use agent::{Agent, Last};
-pub use greedy::{Behaviour, argmax_tol, greedy_set, greedy_sets};
-pub use q_learning::QLearning;
+pub use agent::{Agent, Last, Learn, Seen};
+pub use behaviour::{Behaviour, EpsilonGreedy, Exploration, Explore};
+pub use bootstrapped::{Bootstrapped, stability_bound};
+pub use control::{QLearning, Sarsa, td_error};
+pub use episode::Visits;
+pub use greedy::{argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed};
+pub use look_back::LookBack;
+pub use monte_carlo::MonteCarlo;
+pub use off_policy_monte_carlo::OffPolicyMonteCarlo;
+pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
 pub use q_table::QTable;
 pub use random_agent::RandomAgent;
-pub use registry::{AgentConfig, AgentSpec, AnyAgent, ParamValue};
-pub use sarsa::Sarsa;
+pub use registry::{AgentSpec, AnyAgent};
 pub use schedule::{Schedule, ScheduleState, Unit};
-pub use tabular::td_error;
+pub use softmax::Softmax;
+pub use step_size::{AlphaSource, Rate, StepSize};
+pub use ucb::Ucb;

@@ -57,6 +57,18 @@ impl QTable {
         &mut self.values[s * self.n_actions + a]
     }
 
+    /// The place of (s, a) among [`Self::values`].
+    #[inline]
+    pub fn pair(&self, s: usize, a: usize) -> usize {
+        s * self.n_actions + a
+    }
+
+    /// All values, row-major, to change them.
+    #[inline]
+    pub(super) fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// max over a of Q(s, a).
     #[inline]
     pub fn max(&self, s: usize) -> f64 {

@@ -1,6 +1,7 @@
 //! The agent that learns nothing: every comparison's baseline.
 
-use super::{Agent, Last, QTable};
+use super::greedy::pick_allowed;
+use super::{Agent, Last, Learn, QTable, Seen};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
@@ -20,18 +21,6 @@ impl RandomAgent {
 }
 
 impl Agent for RandomAgent {
-    #[inline]
-    fn begin(&mut self, _s: usize) -> Action {
-        self.stream.below(self.n_actions)
-    }
-
-    #[inline]
-    fn step(&mut self, _reward: f64, next: usize) -> Action {
-        self.begin(next)
-    }
-
-    fn end(&mut self, _reward: f64, _last: Last) {}
-
     fn gamma(&self) -> f64 {
         self.gamma
     }
@@ -47,4 +36,22 @@ impl Agent for RandomAgent {
     fn q(&self) -> Option<&QTable> {
         None
     }
+}
+
+impl<S: Seen> Learn<S> for RandomAgent {
+    #[inline]
+    fn begin(&mut self, s: S) -> Action {
+        if S::SHIELDED {
+            pick_allowed(self.n_actions, s, self.stream.uniform())
+        } else {
+            self.stream.below(self.n_actions)
+        }
+    }
+
+    #[inline]
+    fn step(&mut self, _reward: f64, next: S) -> Action {
+        self.begin(next)
+    }
+
+    fn end(&mut self, _reward: f64, _last: Last<S>) {}
 }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::FiniteMdp;
 use super::numpy::NumpyRng;
+use super::{FiniteMdp, math};
 
 /// A discrete action: an index below [`Env::n_actions`].
 pub type Action = usize;
@@ -58,7 +58,7 @@ pub struct Step<O> {
 ///
 /// All randomness comes from the generator that is passed in, which stands for Gymnasium's
 /// `np_random`; the same seed therefore gives Gymnasium's own trajectory.
-pub trait Env: Send {
+pub trait Env: Send + Sync {
     /// An observation: an array of float32 as Gymnasium returns it, or a state index.
     type Obs: Copy + Send + Sync + std::fmt::Debug + 'static;
 
@@ -109,6 +109,27 @@ pub trait Env: Send {
 
     /// The observation of state `index`, as after a reset; `None` on continuous environments.
     fn state(&self, _index: usize) -> Option<Self::Obs> {
+        None
+    }
+
+    /// Puts the environment into state `index`, as if an episode had started there, and returns its
+    /// observation: for exploring starts (Sutton & Barto 2018, section 5.3) and for audits.
+    ///
+    /// What the observation does not show stays as the last reset drew it, so that an episode that
+    /// may start anywhere is [`Self::reset`] and this. `None`, and nothing changes, on continuous
+    /// environments and where there is no such state to act in.
+    fn set_index(&mut self, _index: usize) -> Option<Self::Obs> {
+        None
+    }
+
+    /// Puts the environment into the state that has these `fields` (all that [`Self::schema`] names,
+    /// in its order), as if an episode had started there, and returns its observation.
+    ///
+    /// `None`, and nothing changes, where the observation does not determine the state, and if an
+    /// episode cannot be there and go on: numbers that are not finite or out of their range, and
+    /// terminal states. A float32 of an observation is never out of its range; of a cosine and a
+    /// sine only the direction counts.
+    fn set_state(&mut self, _fields: &[f64]) -> Option<Self::Obs> {
         None
     }
 
@@ -179,6 +200,19 @@ pub fn widen<const N: usize>(obs: &[f32; N], out: &mut [f64]) {
     for (out, &x) in out.iter_mut().zip(obs) {
         *out = f64::from(x);
     }
+}
+
+/// `x` between `low` and `high`, if its float32 is between theirs: the inverse of [`widen`] for a
+/// field that is bounded in float64, whose bounds may have been rounded outwards. `None` for NaN.
+pub fn within(x: f64, low: f64, high: f64) -> Option<f64> {
+    (low as f32..=high as f32).contains(&(x as f32)).then(|| x.clamp(low, high))
+}
+
+/// The angle of a cosine and a sine that need not be normalised exactly, in radians from -π to π.
+/// `None` if they have no direction.
+pub fn angle(cos: f64, sin: f64) -> Option<f64> {
+    let directed = cos.is_finite() && sin.is_finite() && (cos != 0.0 || sin != 0.0);
+    directed.then(|| math::atan2(sin, cos))
 }
 
 /// The fields of an environment's states, and the facts that are the same in all of them.

@@ -15,7 +15,8 @@ pub mod numpy;
 pub mod streams;
 
 pub use env::{
-    Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, widen,
+    Action, ActionSpace, Ending, Env, Field, FieldKind, Grid, MAX_FIELDS, Schema, Step, angle,
+    widen, within,
 };
 pub use finite::{FiniteMdp, FiniteMdpError, Outcome};
 pub use finite_env::{FiniteEnv, FiniteState};

@@ -12,8 +12,10 @@ use super::params::show;
 use super::plan::Callback;
 use super::record;
 use super::state::{State, StepView};
-use crate::mdp::{Env, Schema};
-use crate::shaping::{CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn, Scale};
+use crate::mdp::{Action, Env, Schema};
+use crate::shaping::{
+    ActionFn, ActionSet, CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn, Scale, ShieldFn,
+};
 
 fn fault(diagnostic: Diagnostic) -> Fault {
     Fault(Box::new(diagnostic))
@@ -53,12 +55,16 @@ impl Callbacks {
         Prepared { callback: callback.clone(), captures }
     }
 
-    /// Calls `callback` with `arg` after its captured values, which it gets as copies: what it
+    /// Calls `callback` with `given` after its captured values, which it gets as copies: what it
     /// does to them is forgotten.
-    fn call(&self, callback: &Prepared, arg: Dynamic) -> Result<Dynamic, Diagnostic> {
-        let mut args = Vec::with_capacity(callback.captures.len() + 1);
+    fn call<const N: usize>(
+        &self,
+        callback: &Prepared,
+        given: [Dynamic; N],
+    ) -> Result<Dynamic, Diagnostic> {
+        let mut args = Vec::with_capacity(callback.captures.len() + N);
         args.extend(callback.captures.iter().cloned());
-        args.push(arg);
+        args.extend(given);
         let options = CallFnOptions::new().eval_ast(false).rewind_scope(true);
         let mut scope = self.scope.borrow_mut();
         let name = &callback.callback.function;
@@ -85,15 +91,15 @@ impl Callbacks {
     }
 
     /// A call that must give a number.
-    fn number(
+    fn number<const N: usize>(
         &self,
         callback: &Prepared,
         what: &str,
-        arg: Dynamic,
+        given: [Dynamic; N],
         state: &State,
     ) -> Result<f64, Diagnostic> {
         let on = || format!("on the state {}", state.describe());
-        let result = self.call(callback, arg).map_err(|d| d.note(on()))?;
+        let result = self.call(callback, given).map_err(|d| d.note(on()))?;
         let number = super::params::number(&result);
         match number {
             Some(x) if x.is_finite() => Ok(x),
@@ -113,14 +119,112 @@ impl Callbacks {
         }
     }
 
-    /// `callback` as a potential of the state's fields.
+    /// `callback` as a potential of the state's fields, and of the episode if it takes two
+    /// arguments.
     pub fn potential(self: &Rc<Self>, callback: &Callback, schema: &Schema) -> PhiFn {
+        let (host, callback, schema) =
+            (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
+        Box::new(move |fields, episode| {
+            let state = State::new(&schema, fields);
+            let s = Dynamic::from(state.clone());
+            let number = if callback.callback.arity == 1 {
+                host.number(&callback, "the potential", [s], &state)
+            } else {
+                let given = [s, Dynamic::from(i64::from(episode))];
+                host.number(&callback, "the potential", given, &state)
+                    .map_err(|d| d.note(format!("for episode {episode}")))
+            };
+            number.map_err(fault)
+        })
+    }
+
+    /// `callback` as a number of a state and an action, called `what` in messages; of the state
+    /// alone if it takes one argument.
+    pub fn of_action(
+        self: &Rc<Self>,
+        callback: &Callback,
+        what: &'static str,
+        schema: &Schema,
+    ) -> ActionFn {
+        let (host, callback, schema) =
+            (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
+        Box::new(move |fields, action| {
+            let state = State::new(&schema, fields);
+            let s = Dynamic::from(state.clone());
+            let number = if callback.callback.arity == 1 {
+                host.number(&callback, what, [s], &state)
+            } else {
+                host.number(&callback, what, [s, Dynamic::from(action as i64)], &state)
+                    .map_err(|d| d.note(format!("for action {}", called(&schema, action))))
+            };
+            number.map_err(fault)
+        })
+    }
+
+    /// `callback` as a policy over `n_actions` actions: the number of one of them.
+    pub fn policy(
+        self: &Rc<Self>,
+        callback: &Callback,
+        n_actions: usize,
+        schema: &Schema,
+    ) -> impl FnMut(&[f64]) -> Result<Action, Fault> + use<> {
+        let (host, callback, schema) =
+            (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
+        move |fields| {
+            let state = State::new(&schema, fields);
+            let on = || format!("on the state {}", state.describe());
+            let given = [Dynamic::from(state.clone())];
+            let value = host.call(&callback, given).map_err(|d| fault(d.note(on())))?;
+            let action = value.as_int().ok().and_then(|a| usize::try_from(a).ok());
+            action.filter(|&a| a < n_actions).ok_or_else(|| {
+                let d = Diagnostic::error(format!(
+                    "the policy {} must return the number of an action, 0 to {}, it returned {}",
+                    callback.callback.described(),
+                    n_actions - 1,
+                    show(&value)
+                ));
+                let d = d.maybe_hint(value.is_float().then(|| "write floor(x).to_int()".into()));
+                fault(host.annotate(d.at(callback.callback.place.clone()).note(on())))
+            })
+        }
+    }
+
+    /// `callback` as a shield over `n_actions` actions.
+    pub fn shield(
+        self: &Rc<Self>,
+        callback: &Callback,
+        n_actions: usize,
+        schema: &Schema,
+    ) -> ShieldFn {
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
         Box::new(move |fields| {
             let state = State::new(&schema, fields);
-            let arg = Dynamic::from(state.clone());
-            host.number(&callback, "the potential", arg, &state).map_err(fault)
+            let on = || format!("on the state {}", state.describe());
+            let mut allowed = 0;
+            for action in 0..n_actions {
+                let args = [Dynamic::from(state.clone()), Dynamic::from(action as i64)];
+                let value = host.call(&callback, args).map_err(|d| fault(d.note(on())))?;
+                let allows = value.as_bool().map_err(|_| {
+                    let d = Diagnostic::error(format!(
+                        "the shield {} must return true or false, it returned {} for action {}",
+                        callback.callback.described(),
+                        show(&value),
+                        called(&schema, action)
+                    ));
+                    fault(host.annotate(d.at(callback.callback.place.clone()).note(on())))
+                })?;
+                allowed |= u64::from(allows) << action;
+            }
+            if allowed == 0 {
+                let d = Diagnostic::error(format!(
+                    "the shield {} allows no action in a state that is not terminal",
+                    callback.callback.described()
+                ));
+                let d = d.at(callback.callback.place.clone()).note(on());
+                return Err(fault(host.annotate(d.hint("allow at least one action everywhere"))));
+            }
+            Ok(ActionSet(allowed))
         })
     }
 
@@ -142,7 +246,7 @@ impl Callbacks {
             shown.copy_from_slice(fields);
             Scale::show_all(&scales, shown);
             let state = State::new(&schema, shown);
-            let result = host.call(&callback, Dynamic::from(state.clone()));
+            let result = host.call(&callback, [Dynamic::from(state.clone())]);
             result
                 .and_then(|value| {
                     cell_index(&value, &shape, &callback.callback).map_err(|d| host.annotate(d))
@@ -179,7 +283,7 @@ impl Callbacks {
             };
             let call = |callback: &Prepared, what: &str| {
                 let arg = Dynamic::from(step.clone());
-                host.number(callback, what, arg, &step.state).map_err(|d| {
+                host.number(callback, what, [arg], &step.state).map_err(|d| {
                     fault(d.note(format!(
                         "action {}, to {}",
                         step.action,
@@ -202,7 +306,7 @@ impl Callbacks {
 
     /// The numbers of real-valued action `index`.
     pub(super) fn action(&self, callback: &Callback, index: usize) -> Result<Vec<f64>, Diagnostic> {
-        let value = self.call(&self.prepare(callback), Dynamic::from(index as i64))?;
+        let value = self.call(&self.prepare(callback), [Dynamic::from(index as i64)])?;
         let numbers = match value.read_lock::<rhai::Array>() {
             Some(list) => list.iter().map(super::params::number).collect(),
             None => super::params::number(&value).map(|x| vec![x]),
@@ -234,7 +338,7 @@ impl Callbacks {
     /// # Errors
     /// If the claim cannot be evaluated, or is not true or false.
     pub fn holds(&self, claim: &Callback, results: &serde_json::Value) -> Result<bool, Diagnostic> {
-        let value = self.call(&self.prepare(claim), record::dynamic("the results", results))?;
+        let value = self.call(&self.prepare(claim), [record::dynamic("the results", results)])?;
         value.as_bool().map_err(|_| {
             let d =
                 Diagnostic::error(format!("an expectation is true or false, got {}", show(&value)));
@@ -244,6 +348,14 @@ impl Callbacks {
                 ),
             )
         })
+    }
+}
+
+/// An action's number, with its name if it has one.
+fn called(schema: &Schema, action: usize) -> String {
+    match schema.actions.get(action) {
+        Some(name) => format!("{action} ({name})"),
+        None => action.to_string(),
     }
 }
 

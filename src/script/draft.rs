@@ -11,6 +11,7 @@ use super::keys;
 use super::params::{merge_agent, number, show, text, whole};
 use super::plan::GoldenBudget;
 use super::setting::{Entries, SettingDraft};
+use super::shaping::ShapingDraft;
 use super::value::MAX_DEPTH;
 use crate::learn::ParamValue;
 use crate::learn::registry::AgentSpec;
@@ -37,6 +38,8 @@ pub(super) struct Located<T> {
 pub(super) struct AgentDraft {
     pub(super) spec: &'static AgentSpec,
     pub(super) params: BTreeMap<&'static str, ParamValue>,
+    /// Parameters that are functions.
+    pub(super) functions: BTreeMap<&'static str, Located<FnPtr>>,
 }
 
 /// `env("FrozenLake-v1", #{ … })`, or a bare id.
@@ -78,10 +81,10 @@ pub(super) struct ExperimentDraft {
     pub(super) threshold: Option<f64>,
     pub(super) window: Option<u32>,
     pub(super) setting: SettingDraft,
-    pub(super) potential: Option<Located<FnPtr>>,
-    pub(super) potential_raw: bool,
+    pub(super) shaping: ShapingDraft,
     pub(super) reward: Option<Located<FnPtr>>,
     pub(super) terms: BTreeMap<String, Located<FnPtr>>,
+    pub(super) allowed: Option<Located<FnPtr>>,
     pub(super) notes: Option<String>,
 }
 
@@ -101,7 +104,7 @@ pub(super) fn wrong(key: &str, expected: &str, value: &Dynamic) -> Diagnostic {
     Diagnostic::error(format!("`{key}` is {expected}, got {}", show(value)))
 }
 
-fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagnostic> {
+pub(super) fn function(key: &str, signature: &str, value: &Dynamic) -> Result<FnPtr, Diagnostic> {
     value
         .clone()
         .flatten()
@@ -191,23 +194,17 @@ impl ExperimentDraft {
                 let finite = number(value).filter(|x| x.is_finite());
                 self.threshold = Some(finite.ok_or_else(|| wrong(key, "a finite number", value))?);
             }
-            "potential" if removed => self.potential = None,
-            "potential" => self.potential = Some(located(function(key, "(s) -> number", value)?)),
-            "potential_on" => {
-                self.potential_raw = match text(value).as_deref() {
-                    Some("cell") => false,
-                    Some("raw") => true,
-                    _ => return Err(wrong(key, "\"cell\" or \"raw\"", value)),
-                }
-            }
             "reward" if removed => self.reward = None,
             "reward" => self.reward = Some(located(function(key, "(t) -> number", value)?)),
+            "allowed" if removed => self.allowed = None,
+            "allowed" => self.allowed = Some(located(function(key, "(s, a) -> bool", value)?)),
             "terms" if removed => self.terms.clear(),
             "terms" => self.set_terms(value, spot)?,
             "notes" => {
                 self.notes = Some(text(value).ok_or_else(|| wrong(key, "a string", value))?);
             }
             key if SettingDraft::knows(key) => self.setting.set(key, value, spot)?,
+            key if ShapingDraft::knows(key) => self.shaping.set(key, value, spot(key))?,
             unknown => {
                 return Err(Diagnostic::error(format!("an experiment has no key `{unknown}`"))
                     .maybe_hint(suggest(unknown, keys::names())));
@@ -286,7 +283,8 @@ impl ExperimentDraft {
 }
 
 /// Columns of `episodes.csv` that no term may take.
-const TAKEN_COLUMNS: [&str; 9] = [
+const TAKEN_COLUMNS: [&str; 10] = [
+    "value_error",
     "variant",
     "seed",
     "episode",

@@ -46,6 +46,11 @@ const BUILDERS: &[(&str, &str, &str)] = &[
         "uniform bins: NumPy's linspace and digitize, clamped; fields left out are ignored",
     ),
     ("cells", "cells(n, |s| i) or cells([n1, n2], |s| [i, j])", "scripted cells, numbered from 0"),
+    (
+        "learned",
+        "learned(eta)",
+        "a potential of eta times the learner's own state values, eta · max Q(s, a)",
+    ),
     ("constant", "constant(value)", "a schedule that does not change"),
     (
         "linear",
@@ -56,6 +61,17 @@ const BUILDERS: &[(&str, &str, &str)] = &[
         "exponential",
         "exponential(start, factor, min [, #{ steps: true }])",
         "start · factorⁿ per episode (or step), at least min",
+    ),
+    (
+        "visit_count",
+        "visit_count() or visit_count(omega)",
+        "a step size: 1/N(s, a), or N(s, a)^-omega",
+    ),
+    ("softmax", "softmax(temperature)", "exploration: actions weigh exp(Q / temperature)"),
+    (
+        "ucb",
+        "ucb(c)",
+        "exploration: the largest Q + c √(ln N(s) / N(s, a)), actions never tried first",
     ),
 ];
 

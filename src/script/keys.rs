@@ -50,7 +50,7 @@ pub const KEYS: &[Key] = &[
     key("window", "integer", "episodes in the rolling mean; default 20"),
     key(
         "potential",
-        "|s| number",
+        "|s| number, |s, episode| number or learned(eta)",
         "Φ(s): the host adds γΦ(s′) − Φ(s) with the agent's γ and Φ(terminal) = 0",
     ),
     key(
@@ -58,8 +58,24 @@ pub const KEYS: &[Key] = &[
         "\"cell\" or \"raw\"",
         "evaluate Φ on the cell's representative (default, keeps the guarantee) or the raw state",
     ),
+    key("potential_shift", "number", "added to Φ, except of terminal states; default 0"),
+    key(
+        "advice",
+        "|s, a| number",
+        "Φ(s, a): adds γΦ(s′, a′) − Φ(s, a), a′ being the action bootstrapped from",
+    ),
+    key(
+        "advice_on",
+        "\"look_ahead\" or \"look_back\"",
+        "look_back adds Φ(s, a) − Φ of the step before / γ, for on-policy learners",
+    ),
     key("reward", "|t| number", "replaces the reward the agent learns from"),
     key("terms", "#{ name: |t| number, .. }", "extra reward terms, each logged under its name"),
+    key(
+        "allowed",
+        "|s, a| bool",
+        "a shield: what it refuses is neither taken nor bootstrapped from",
+    ),
     key("notes", "string", "the rationale, carried into the manifest"),
 ];
 

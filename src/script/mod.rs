@@ -14,6 +14,7 @@ mod diagnostic;
 mod draft;
 mod engine;
 mod errors;
+mod freeze;
 pub mod functions;
 mod host;
 pub mod keys;
@@ -24,6 +25,7 @@ mod record;
 mod resolve;
 mod sandbox;
 mod setting;
+mod shaping;
 mod source;
 mod state;
 mod syntax;
@@ -37,5 +39,6 @@ pub use host::{Host, load};
 pub use plan::{
     Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, Variant,
 };
+pub use shaping::{AdviceOn, Shaping};
 pub use source::{Source, SourceSet};
 pub use value::Value;

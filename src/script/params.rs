@@ -1,13 +1,19 @@
 //! Reading typed values out of a script's maps.
 
-use rhai::{Dynamic, Map};
+use rhai::{Dynamic, FnPtr, Map};
 
 use super::diagnostic::{Diagnostic, suggest};
-use super::draft::{AgentDraft, Spot};
+use super::draft::{AgentDraft, Located, Spot, captured_now};
 use super::errors::type_name;
 use super::value::Value;
 use crate::learn::registry::AgentSpec;
-use crate::learn::{ParamValue, Schedule};
+use crate::learn::{Exploration, ParamKind, ParamValue, Schedule};
+
+/// What `visit_count(..)` returns: α = N(s, a)^−omega.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct VisitCount {
+    pub(super) omega: f64,
+}
 
 /// A value in words, for messages: `"abc"`, `3`, `a function`.
 pub(super) fn show(value: &Dynamic) -> String {
@@ -25,8 +31,8 @@ pub(super) fn show(value: &Dynamic) -> String {
         let text = value.to_string();
         return if text.chars().count() > 60 { "an array".into() } else { text };
     }
-    if let Some(schedule) = value.clone().try_cast::<Schedule>() {
-        return ParamValue::Schedule(schedule).to_string();
+    if let Some(parameter) = built(&value) {
+        return parameter.to_string();
     }
     if value.is_map() {
         return "a map".into();
@@ -37,6 +43,7 @@ pub(super) fn show(value: &Dynamic) -> String {
         "EnvDraft" => "an environment".into(),
         "DiscretiserDraft" => "a discretiser".into(),
         "StudyDraft" => "a study".into(),
+        "LearnedPotential" => "a learned potential".into(),
         other => format!("a value of type {}", type_name(other)),
     }
 }
@@ -106,28 +113,71 @@ pub(super) fn merge_agent(
                 .at(place())
                 .maybe_hint(suggest(key, names)));
         };
-        let flat = value.clone().flatten();
-        let raw = if let Ok(n) = flat.as_int() {
-            u64::try_from(n).map_or(ParamValue::Float(n as f64), ParamValue::Int)
-        } else if let Ok(x) = flat.as_float() {
-            ParamValue::Float(x)
-        } else if let Some(schedule) = flat.clone().try_cast::<Schedule>() {
-            ParamValue::Schedule(schedule)
-        } else {
-            ParamValue::Float(f64::NAN)
-        };
-        let accepted = param.kind.accept(raw).ok_or_else(|| {
+        if let (Some(_), Some(f)) = (param.function, value.clone().flatten().try_cast::<FnPtr>()) {
+            let value = captured_now(f);
+            agent.functions.insert(param.name, Located { value, spot: spot(key) });
+            agent.params.insert(param.name, ParamValue::Function);
+            continue;
+        }
+        let accepted = param.kind.accept(raw(value, param.kind)).ok_or_else(|| {
+            let function = match param.function {
+                Some(signature) => format!(", or a function {}", signature.text),
+                None => String::new(),
+            };
             Diagnostic::error(format!(
-                "`{key}` of `{}` is {}, got {}",
+                "`{key}` of `{}` is {}{function}, got {}",
                 spec.name,
                 param.kind.allowed(),
                 show(value)
             ))
             .at(place())
         })?;
+        agent.functions.remove(param.name);
         agent.params.insert(param.name, accepted);
     }
-    Ok(())
+    match agent.params.get("exploration") {
+        Some(ParamValue::Exploration(Exploration::EpsilonGreedy)) | None => Ok(()),
+        Some(policy) if map.contains_key("epsilon") => {
+            Err(Diagnostic::error(format!("`epsilon` plays no part with {policy}"))
+                .at(spot("epsilon").place())
+                .hint("leave it out, or say `exploration: \"epsilon_greedy\"`"))
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+/// A script's value as a parameter's, NaN if it is nothing that a parameter can be.
+fn raw(value: &Dynamic, kind: ParamKind) -> ParamValue {
+    let flat = value.clone().flatten();
+    if let Ok(n) = flat.as_int() {
+        return u64::try_from(n).map_or(ParamValue::Float(n as f64), ParamValue::Int);
+    }
+    if let Ok(x) = flat.as_float() {
+        return ParamValue::Float(x);
+    }
+    if let Ok(yes) = flat.as_bool() {
+        return ParamValue::Bool(yes);
+    }
+    if let (Some(word), ParamKind::Word(words)) = (text(&flat), kind) {
+        let known = words.iter().find(|known| **known == word);
+        return known.map_or(ParamValue::Float(f64::NAN), |word| ParamValue::Word(word));
+    }
+    if let (ParamKind::Exploration, Some(Exploration::DEFAULT)) = (kind, text(&flat).as_deref()) {
+        return ParamValue::Exploration(Exploration::EpsilonGreedy);
+    }
+    built(&flat).unwrap_or(ParamValue::Float(f64::NAN))
+}
+
+/// What a function has built as the value of a parameter.
+fn built(value: &Dynamic) -> Option<ParamValue> {
+    let cast = value.clone();
+    cast.try_cast::<Schedule>()
+        .map(ParamValue::Schedule)
+        .or_else(|| value.clone().try_cast().map(ParamValue::Exploration))
+        .or_else(|| {
+            let VisitCount { omega } = value.clone().try_cast()?;
+            Some(ParamValue::VisitCount { omega })
+        })
 }
 
 /// The `#{ steps: true }` at the end of a schedule; `spot` finds the place of a key.

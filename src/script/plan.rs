@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value as Json};
 
 use super::diagnostic::{Diagnostic, Place};
+use super::shaping::Shaping;
 use super::source::SourceSet;
 use super::value::Value;
 use crate::env::{AnyEnv, EnvConfig, EnvError, EnvSpec};
@@ -19,6 +20,8 @@ pub struct Callback {
     pub(super) function: String,
     /// Values captured by a closure: its leading arguments.
     pub(super) captures: Vec<Value>,
+    /// How many arguments it takes after those.
+    pub arity: usize,
     /// How it is called in messages: `height`, or `closure`.
     pub label: String,
     /// Where the script hands it over.
@@ -86,6 +89,8 @@ pub struct Variant {
     pub normalise: Vec<Scale>,
     /// The agent.
     pub agent: AgentConfig,
+    /// Functions among its parameters, by their keys.
+    pub agent_functions: BTreeMap<&'static str, Callback>,
     /// State → cell.
     pub discretiser: DiscretiserSpec,
     /// Episodes per seed.
@@ -98,14 +103,18 @@ pub struct Variant {
     pub threshold: Option<f64>,
     /// Window of the rolling mean, in episodes.
     pub window: u32,
-    /// Φ(s).
+    /// Φ(s), or Φ(s, episode) if it takes two arguments.
     pub potential: Option<Callback>,
     /// On what Φ is evaluated.
     pub potential_on: PhiOn,
+    /// What else shapes the reward.
+    pub shaping: Shaping,
     /// Replaces the learned reward.
     pub reward: Option<Callback>,
     /// Extra reward terms by name.
     pub terms: BTreeMap<String, Callback>,
+    /// The shield: which actions may be taken.
+    pub allowed: Option<Callback>,
     /// The rationale, for manifest and report.
     pub notes: Option<String>,
 }
@@ -151,7 +160,17 @@ impl Variant {
         lines
     }
 
-    /// Whether the agent learns from anything but the native reward and a potential.
+    /// Whether a potential or advice shapes the reward.
+    pub fn is_shaped(&self) -> bool {
+        self.potential.is_some() || self.shaping.is_active()
+    }
+
+    /// Whether Φ changes from episode to episode.
+    pub fn is_dynamic(&self) -> bool {
+        self.potential.as_ref().is_some_and(|phi| phi.arity == 2)
+    }
+
+    /// Whether the agent learns from anything but the native reward, a potential and advice.
     pub fn changes_reward(&self) -> bool {
         self.reward.is_some() || !self.terms.is_empty() || self.clip_reward.is_some()
     }
@@ -170,7 +189,9 @@ impl Variant {
             }
         };
         let params: Map<String, Json> =
-            self.agent.params.iter().map(|(k, v)| ((*k).into(), serde_json::json!(v))).collect();
+            self.agent.in_effect().map(|(k, v)| (k.into(), serde_json::json!(v))).collect();
+        let functions: Map<String, Json> =
+            self.agent_functions.iter().map(|(k, c)| ((*k).into(), digest(c))).collect();
         let terms: Map<String, Json> =
             self.terms.iter().map(|(k, c)| (k.clone(), digest(c))).collect();
         serde_json::json!({
@@ -189,8 +210,11 @@ impl Variant {
             "max_steps": self.max_steps,
             "potential": self.potential.as_ref().map(digest),
             "potential_on": self.potential.is_some().then_some(self.potential_on),
+            "shaping": self.shaping.identity(),
             "reward": self.reward.as_ref().map(digest),
             "terms": terms,
+            "agent_functions": functions,
+            "allowed": self.allowed.as_ref().map(digest),
         })
     }
 }

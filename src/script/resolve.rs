@@ -1,22 +1,21 @@
 //! From what the script wrote to what will run: defaults filled in, names and fields resolved,
 //! callbacks frozen and hashed.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use rhai::FnPtr;
-use sha2::{Digest, Sha256};
 
 use super::callback::Callbacks;
 use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
-use super::plan::{Callback, DiscretiserSpec, Expectation, PhiOn, Plan, SeedList, Variant};
-use super::source::{hex, tokens};
+use super::freeze::{ALLOWED, OF_STEP};
+use super::plan::{Callback, DiscretiserSpec, Expectation, Plan, SeedList, Variant};
 use super::value::Value;
 use super::world::{clipping_warning, dims, example_bins, physical_bins};
 use crate::env::{AnyEnv, EnvSpec};
-use crate::learn::AgentConfig;
-use crate::shaping::{Dim, Scale};
+use crate::learn::{AgentConfig, ParamValue, Signature};
+use crate::shaping::{ActionSet, Dim, Scale};
 
 const EPISODES: u32 = 500;
 const SEEDS: u64 = 20;
@@ -60,7 +59,7 @@ pub(super) fn plan(
     }
     let mut expectations = Vec::with_capacity(study.expectations.len());
     for (text, check) in &study.expectations {
-        let check = resolver.callback(check, "(r) -> bool", 1)?;
+        let check = resolver.callback(check, Signature { text: "(r) -> bool", arities: &[1] })?;
         expectations.push(Expectation { text: text.clone(), check });
     }
     let sources = host.context.sources.borrow().clone();
@@ -82,7 +81,7 @@ pub(super) fn plan(
 /// Resolves one study's experiments.
 pub(super) struct Resolver<'a> {
     pub(super) host: &'a Rc<Callbacks>,
-    constants: &'a BTreeMap<String, Value>,
+    pub(super) constants: &'a BTreeMap<String, Value>,
 }
 
 impl Resolver<'_> {
@@ -120,41 +119,18 @@ impl Resolver<'_> {
                 warnings.push(warning);
             }
         }
-        let potential = self.optional(draft.potential.as_ref(), "(s) -> number")?;
-        if potential.is_some()
-            && draft.potential_raw
-            && !matches!(discretiser, DiscretiserSpec::StateIndex)
-        {
-            let hint = match discretiser {
-                DiscretiserSpec::Bins(_) => {
-                    "leave out `potential_on: \"raw\"` to evaluate it on each cell's representative"
-                }
-                _ => "bins(..) have a representative to evaluate it on, scripted cells do not",
-            };
-            let warning = Diagnostic::warning(
-                "a potential of the raw state is not constant on the discretiser's cells",
-            )
-            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
-            .note("the greedy policy of the discretised problem may change")
-            .hint(hint);
-            // Variants that inherit their potential say it once.
-            if !warnings.contains(&warning) {
-                warnings.push(warning);
+        let shaped = self.shaping(&draft.shaping, &agent.value, &discretiser, warnings)?;
+        let allowed = self.allowed(draft, &any, spec)?;
+        use_of_model(draft, &agent, spec, &any, &discretiser)?;
+        let mut agent_functions = BTreeMap::new();
+        if let Some(drafted) = &draft.agent {
+            for (name, f) in &drafted.value.functions {
+                agent_functions.insert(*name, self.agent_function(&agent, name, f, &discretiser)?);
             }
-        }
-        if potential.is_some()
-            && !draft.potential_raw
-            && matches!(discretiser, DiscretiserSpec::Cells { .. })
-        {
-            return Err(Diagnostic::error(
-                "scripted cells have no representative to evaluate the potential on",
-            )
-            .at(draft.potential.as_ref().and_then(|p| p.spot.place()))
-            .hint("use bins(..), or say `potential_on: \"raw\"`"));
         }
         let mut terms = BTreeMap::new();
         for (name, f) in &draft.terms {
-            terms.insert(name.clone(), self.callback(f, "(t) -> number", 1)?);
+            terms.insert(name.clone(), self.callback(f, OF_STEP)?);
         }
         Ok(Variant {
             name: draft
@@ -168,18 +144,61 @@ impl Resolver<'_> {
             clip_reward: setting.clip_reward.as_ref().map(|c| c.value),
             normalise,
             agent: agent.value,
+            agent_functions,
             discretiser,
             episodes: draft.episodes.unwrap_or(EPISODES),
             seeds: SeedList(draft.seeds.clone().unwrap_or_else(|| (0..SEEDS).collect())),
             max_steps: draft.max_steps.or(spec.max_steps).filter(|&n| n > 0),
             threshold: draft.threshold.or(spec.reward_threshold),
             window: draft.window.unwrap_or(WINDOW),
-            potential,
-            potential_on: if draft.potential_raw { PhiOn::Raw } else { PhiOn::Cell },
-            reward: self.optional(draft.reward.as_ref(), "(t) -> number")?,
+            potential: shaped.potential,
+            potential_on: shaped.potential_on,
+            shaping: shaped.shaping,
+            reward: self.optional(draft.reward.as_ref(), OF_STEP)?,
             terms,
+            allowed,
             notes: draft.notes.clone(),
         })
+    }
+
+    /// The shield.
+    fn allowed(
+        &self,
+        draft: &ExperimentDraft,
+        env: &AnyEnv,
+        spec: &EnvSpec,
+    ) -> Result<Option<Callback>, Diagnostic> {
+        let Some(f) = &draft.allowed else { return Ok(None) };
+        let (n, most) = (env.n_actions(), ActionSet::CAPACITY);
+        if n > most {
+            return Err(Diagnostic::error(format!(
+                "a shield tells at most {most} actions apart, here {} has {n}",
+                spec.id
+            ))
+            .at(f.spot.place())
+            .hint("give fewer `actions`"));
+        }
+        self.callback(f, ALLOWED).map(Some)
+    }
+
+    /// A function among an agent's parameters.
+    fn agent_function(
+        &self,
+        agent: &Located<AgentConfig>,
+        name: &str,
+        f: &Located<FnPtr>,
+        discretiser: &DiscretiserSpec,
+    ) -> Result<Callback, Diagnostic> {
+        let param = agent.value.spec.params.iter().find(|p| p.name == name);
+        let signature = param.and_then(|p| p.function).expect("checked when it was merged");
+        if matches!(discretiser, DiscretiserSpec::Cells { .. }) {
+            return Err(Diagnostic::error(format!(
+                "scripted cells have no representative to evaluate `{name}` on"
+            ))
+            .at(f.spot.place())
+            .hint("use bins(..), or give a number"));
+        }
+        self.callback(f, signature)
     }
 
     fn discretiser(
@@ -233,148 +252,61 @@ impl Resolver<'_> {
                     .map_err(|e| e.at(d.spot.place())),
                 DiscretiserDraft::Cells { shape, cell } => {
                     let cell = Located { value: cell.clone(), spot: d.spot.clone() };
-                    let cell = self.callback(&cell, "(s) -> index", 1)?;
+                    let cell =
+                        self.callback(&cell, Signature { text: "(s) -> index", arities: &[1] })?;
                     Ok(DiscretiserSpec::Cells { shape: shape.clone(), cell })
                 }
             },
         }
     }
-
-    fn optional(
-        &self,
-        f: Option<&Located<FnPtr>>,
-        signature: &str,
-    ) -> Result<Option<Callback>, Diagnostic> {
-        f.map(|f| self.callback(f, signature, 1)).transpose()
-    }
-
-    /// Freezes a function pointer: what it captured becomes plain data, its source is hashed.
-    pub(super) fn callback(
-        &self,
-        f: &Located<FnPtr>,
-        signature: &str,
-        n_args: usize,
-    ) -> Result<Callback, Diagnostic> {
-        let place = f.spot.place();
-        let fail = |d: Diagnostic| Err(d.at(place.clone()));
-        let name = f.value.fn_name();
-        let is_closure = name.starts_with("anon$");
-        let label = if is_closure { "closure".to_string() } else { name.to_string() };
-        let captures = match Value::freeze_fn(&f.value) {
-            Ok(Value::Fn { captures, .. }) => captures,
-            Ok(_) => Vec::new(),
-            Err(what) => {
-                return fail(Diagnostic::error(format!(
-                    "a function used while training can capture numbers, strings, arrays and maps, \
-                     not {what}"
-                )));
-            }
-        };
-        let arities: Vec<usize> = self
-            .host
-            .ast
-            .iter_functions()
-            .filter(|d| d.name == name)
-            .map(|d| d.params.len())
-            .collect();
-        if arities.is_empty() {
-            return fail(
-                Diagnostic::error(format!("`{label}` is not a function of this script"))
-                    .hint("wrap it in a closure: |s| module::function(s)"),
-            );
-        }
-        if !arities.contains(&(captures.len() + n_args)) {
-            let given = arities[0].saturating_sub(captures.len());
-            let s = if given == 1 { "" } else { "s" };
-            return fail(Diagnostic::error(format!(
-                "{} takes {given} argument{s}; here a function {signature} is expected",
-                if is_closure { "this closure".to_string() } else { format!("`{label}`") }
-            )));
-        }
-        let digest = self.digest(name, &captures, &mut Vec::new());
-        Ok(Callback { function: name.to_string(), captures, label, place, digest })
-    }
-
-    /// Hashes everything that can change the function's results. Reachability goes by names, which
-    /// errs on the side of too much.
-    /// `within` names the functions whose digests are being made: a constant may hold a function
-    /// that uses that constant.
-    fn digest(&self, function: &str, captures: &[Value], within: &mut Vec<String>) -> String {
-        if let Some(level) = within.iter().position(|name| name == function) {
-            return format!("recursion {level}");
-        }
-        within.push(function.to_string());
-        let script = self.host.context.sources.borrow().script.clone();
-        let syntax = self.host.context.syntax.borrow();
-        let syntax = &syntax[&*script.name];
-        let functions: BTreeSet<String> =
-            self.host.ast.iter_functions().map(|f| f.name.to_string()).collect();
-        let mut parts = BTreeSet::new();
-        let mut queue = vec![function.to_string()];
-        let mut seen = BTreeSet::new();
-        let mut used = BTreeSet::new();
-        while let Some(name) = queue.pop() {
-            if !seen.insert(name.clone()) {
-                continue;
-            }
-            let Some(body) = syntax.function_tokens(&script.text, &name) else { continue };
-            for token in &body {
-                // Interpolated strings hold code of their own.
-                for word in words(token.text) {
-                    if functions.contains(word) {
-                        queue.push(word.to_string());
-                    }
-                    used.insert(word.to_string());
-                }
-            }
-            let is_entry = name == function;
-            let text = body.iter().map(|t| t.text).collect::<Vec<_>>().join(" ");
-            parts.insert(format!("{} {text}", if is_entry { "entry" } else { "function" }));
-        }
-        for (name, value) in self.constants.iter().filter(|(name, _)| used.contains(*name)) {
-            parts.insert(format!("const {name} = {}", self.canonical(value, within)));
-        }
-        if syntax.imports.iter().any(|(_, alias)| used.contains(alias)) {
-            for (path, source) in &self.host.context.sources.borrow().imports {
-                let text =
-                    tokens(&source.text).iter().map(|t| t.text).collect::<Vec<_>>().join(" ");
-                parts.insert(format!("import {path} {text}"));
-            }
-        }
-        for (i, value) in captures.iter().enumerate() {
-            parts.insert(format!("capture {i} = {}", self.canonical(value, within)));
-        }
-        within.pop();
-        let mut hash = Sha256::new();
-        for part in parts {
-            hash.update((part.len() as u64).to_le_bytes());
-            hash.update(part.as_bytes());
-        }
-        hex(&hash.finalize())
-    }
-
-    /// A value as text, with functions replaced by their digests (their names may be made up).
-    fn canonical(&self, value: &Value, within: &mut Vec<String>) -> String {
-        match value {
-            Value::Fn { name, captures } => format!("fn {}", self.digest(name, captures, within)),
-            Value::Array(items) => {
-                format!(
-                    "[{}]",
-                    items.iter().map(|v| self.canonical(v, within)).collect::<Vec<_>>().join(",")
-                )
-            }
-            Value::Map(entries) => {
-                let entries =
-                    entries.iter().map(|(k, v)| format!("{k:?}:{}", self.canonical(v, within)));
-                format!("{{{}}}", entries.collect::<Vec<_>>().join(","))
-            }
-            Value::Float(x) => format!("{:016x}", x.to_bits()),
-            other => format!("{other:?}"),
-        }
-    }
 }
 
-/// The identifiers inside a token (a word is one; a backtick string may hold several).
-fn words(token: &str) -> impl Iterator<Item = &str> {
-    token.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty())
+/// Refuses parameters of learners that need a finite model where there is none to use.
+fn use_of_model(
+    draft: &ExperimentDraft,
+    agent: &Located<AgentConfig>,
+    spec: &EnvSpec,
+    env: &AnyEnv,
+    discretiser: &DiscretiserSpec,
+) -> Result<(), Diagnostic> {
+    let (name, id) = (agent.value.spec.name, spec.id);
+    let refuse = |message: String, hint: &str| {
+        Err(Diagnostic::error(message).at(agent.spot.place()).hint(hint))
+    };
+    let has_model = env.finite().is_some();
+    if agent.value.is_on("exploring_starts") && !has_model {
+        return refuse(
+            format!(
+                "`exploring_starts` draws start states from the finite model of {id}: it has none"
+            ),
+            "leave it out: epsilon explores too",
+        );
+    }
+    if !agent.value.is_predictor() || agent.value.params["policy"] == ParamValue::Word("random") {
+        return Ok(());
+    }
+    if let Some(f) = &draft.allowed {
+        return Err(Diagnostic::error(format!("`{name}` plays the policy that it is given"))
+            .at(f.spot.place())
+            .hint("leave out `allowed`, or say `policy: \"random\"`"));
+    }
+    if agent.value.params["policy"] == ParamValue::Word("greedy") {
+        let why = match (has_model, discretiser) {
+            (false, _) => "it has none",
+            (true, DiscretiserSpec::StateIndex)
+                if draft.setting.frame_skip.is_none_or(|n| n == 1) =>
+            {
+                return Ok(());
+            }
+            (true, DiscretiserSpec::StateIndex) => "it speaks of single steps, not of `frame_skip`",
+            (true, _) => "it speaks of states, not of a discretiser's cells",
+        };
+        return refuse(
+            format!(
+                "`policy: \"greedy\"` of `{name}` is planned on the finite model of {id}: {why}"
+            ),
+            "give the policy as a function: `policy: |s| 0` always plays action 0",
+        );
+    }
+    Ok(())
 }

@@ -5,6 +5,7 @@ use super::draft::{BinDraft, DiscretiserDraft, ExperimentDraft, Located};
 use super::resolve::Resolver;
 use super::setting::ActionsDraft;
 use crate::env::{self, AnyEnv, EnvConfig, EnvError, EnvSpec};
+use crate::learn::Signature;
 use crate::mdp::Schema;
 use crate::shaping::{Bins, Dim, Scale};
 
@@ -38,7 +39,8 @@ impl Resolver<'_> {
             ActionsDraft::Rows(rows) => Ok(rows.clone()),
             ActionsDraft::Scripted(n, action) => {
                 let action = Located { value: action.clone(), spot: actions.spot.clone() };
-                let action = self.callback(&action, "(i) -> [numbers]", 1)?;
+                let action =
+                    self.callback(&action, Signature { text: "(i) -> [numbers]", arities: &[1] })?;
                 (0..*n).map(|i| self.host.action(&action, i)).collect()
             }
         }

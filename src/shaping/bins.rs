@@ -177,12 +177,14 @@ impl<E: Env> Discretiser<E> for Bins {
     /// Where states have indices, bins are the exception.
     const FAST: bool = !E::INDEXED;
 
+    type State = usize;
+
     fn n_cells(&self) -> usize {
         self.n_cells
     }
 
     #[inline]
-    fn cell(&mut self, env: &E, obs: &E::Obs) -> Result<usize, Fault> {
+    fn see(&mut self, env: &E, obs: &E::Obs) -> Result<usize, Fault> {
         let mut fields = [0.0; MAX_FIELDS];
         env.fields(obs, &mut fields);
         Ok(self.index(&fields))

@@ -1,7 +1,9 @@
 //! What stands between an environment and a learner: rewards, potentials and discretisers.
 //!
-//! - [`Discretiser`]: observation → cell. [`StateIndex`], [`Bins`], [`ScriptedCells`]
-//! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`RawPotential`]
+//! - [`Discretiser`]: observation → what the agent sees. [`StateIndex`], [`Bins`],
+//!   [`ScriptedCells`], [`RawFields`]; [`Shield`]: the actions allowed there
+//! - [`Features`]: the state's numbers → features, for linear values; [`Tiles`], [`Fourier`]
+//! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`EpisodePotential`], [`RawPotential`]
 //! - [`Scale`]: observation normalisation
 //! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
 //!   [`ScriptedReward`]
@@ -13,16 +15,21 @@
 
 mod bins;
 mod discretiser;
+mod features;
 mod potential;
 mod reward;
 mod scale;
 
 pub use crate::mdp::MAX_FIELDS;
 pub use bins::{Bins, BinsError, Dim, MAX_CELLS};
-pub use discretiser::{CellFn, Discretiser, ScriptedCells, StateIndex};
+pub use discretiser::{
+    ActionSet, AnyCells, CellFn, Discretiser, Fields, RawFields, ScriptedCells, Seen, Shield,
+    ShieldFn, Shielded, ShieldedCells, StateIndex,
+};
+pub use features::{Active, FeatureKind, FeatureSpec, Features, Fourier, MAX_WEIGHTS, Tiles};
 pub use potential::{
-    AnyPotential, CellPhiFn, CellPotential, NoPotential, PhiFn, Potential, RawPotential,
-    potential_term, shaped_model,
+    ActionFn, AnyPotential, CellEpisodeFn, CellPhiFn, CellPotential, EpisodePotential, NoPotential,
+    PhiFn, Potential, RawPotential, potential_term, shaped_model,
 };
 pub use reward::{
     AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,

@@ -22,11 +22,15 @@ pub fn shaped_model(mdp: &FiniteMdp, gamma: f64, phi: &[f64]) -> FiniteMdp {
     })
 }
 
-/// A potential over states. Evaluated once per visited state: the loop carries Φ(s′) on to the
-/// next step, where it is Φ(s).
+/// A potential over states. Evaluated once per visited state, on arrival: the loop carries Φ(s′) on
+/// to the next step, where it is Φ(s). The discounted terms of an episode then telescope even if the
+/// potential changes while it lasts (Devlin & Kudenko 2012); evaluated anew, they would not.
 pub trait Potential<E: Env> {
     /// Whether there is a potential at all: lets the step leave the term out.
     const ACTIVE: bool = true;
+
+    /// Episode `episode` begins, counted from 1. Until the next one begins, Φ stays as it is.
+    fn begin_episode(&mut self, _episode: u32) {}
 
     /// Φ of the non-terminal state `obs`, which lies in `cell`.
     ///
@@ -91,28 +95,71 @@ impl<E: Env> Potential<E> for CellPotential {
     }
 }
 
-/// A function from the state's fields to Φ.
-pub type PhiFn = Box<dyn FnMut(&[f64]) -> Result<f64, Fault>>;
+/// A function giving Φ of a cell (by its representative) in an episode, counted from 1.
+pub type CellEpisodeFn = Box<dyn FnMut(usize, u32) -> Result<f64, Fault>>;
+
+/// A potential that is constant on each cell and changes from episode to episode (Devlin & Kudenko
+/// 2012): evaluated at most once per cell and episode.
+pub struct EpisodePotential {
+    /// Φ per cell, and the episode in which it was that; 0 for none.
+    table: Vec<(u32, f64)>,
+    episode: u32,
+    evaluate: CellEpisodeFn,
+}
+
+impl EpisodePotential {
+    /// Over `n_cells` cells; `evaluate` is called when a cell is first visited in an episode.
+    pub fn new(n_cells: usize, evaluate: CellEpisodeFn) -> Self {
+        Self { table: vec![(0, 0.0); n_cells], episode: 0, evaluate }
+    }
+}
+
+impl<E: Env> Potential<E> for EpisodePotential {
+    fn begin_episode(&mut self, episode: u32) {
+        self.episode = episode;
+    }
+
+    fn phi(&mut self, _env: &E, cell: usize, _obs: &E::Obs) -> Result<f64, Fault> {
+        let (episode, phi) = self.table[cell];
+        if episode == self.episode {
+            return Ok(phi);
+        }
+        let phi = (self.evaluate)(cell, self.episode)?;
+        self.table[cell] = (self.episode, phi);
+        Ok(phi)
+    }
+}
+
+/// A function from the state's fields and the episode, counted from 1, to Φ.
+pub type PhiFn = Box<dyn FnMut(&[f64], u32) -> Result<f64, Fault>>;
+
+/// A function from the state's fields and an action to a number.
+pub type ActionFn = Box<dyn FnMut(&[f64], usize) -> Result<f64, Fault>>;
 
 /// A potential of the raw observation, evaluated at every visited state.
 pub struct RawPotential {
     n_fields: usize,
+    episode: u32,
     phi: PhiFn,
 }
 
 impl RawPotential {
     /// `phi` receives the state's `n_fields` fields.
     pub fn new(n_fields: usize, phi: PhiFn) -> Self {
-        Self { n_fields, phi }
+        Self { n_fields, episode: 0, phi }
     }
 }
 
 impl<E: Env> Potential<E> for RawPotential {
+    fn begin_episode(&mut self, episode: u32) {
+        self.episode = episode;
+    }
+
     #[inline]
     fn phi(&mut self, env: &E, _cell: usize, obs: &E::Obs) -> Result<f64, Fault> {
         let mut fields = [0.0; MAX_FIELDS];
         env.fields(obs, &mut fields);
-        (self.phi)(&fields[..self.n_fields])
+        (self.phi)(&fields[..self.n_fields], self.episode)
     }
 }
 
@@ -122,16 +169,27 @@ pub enum AnyPotential {
     No(NoPotential),
     /// Constant on cells.
     Cell(CellPotential),
+    /// Constant on cells for an episode.
+    Episode(EpisodePotential),
     /// Of the raw state.
     Raw(RawPotential),
 }
 
 impl<E: Env> Potential<E> for AnyPotential {
+    fn begin_episode(&mut self, episode: u32) {
+        match self {
+            Self::No(_) | Self::Cell(_) => {}
+            Self::Episode(p) => Potential::<E>::begin_episode(p, episode),
+            Self::Raw(p) => Potential::<E>::begin_episode(p, episode),
+        }
+    }
+
     #[inline]
     fn phi(&mut self, env: &E, cell: usize, obs: &E::Obs) -> Result<f64, Fault> {
         match self {
             Self::No(p) => p.phi(env, cell, obs),
             Self::Cell(p) => p.phi(env, cell, obs),
+            Self::Episode(p) => p.phi(env, cell, obs),
             Self::Raw(p) => p.phi(env, cell, obs),
         }
     }

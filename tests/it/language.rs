@@ -29,8 +29,8 @@ fn phi_at(plan: &Plan, variant: usize, row: u8, col: u8) -> f64 {
     let mut phi = host.callbacks().potential(potential(variant), &schema);
     let (row, col) = (f64::from(row), f64::from(col));
     let first =
-        phi(&[row, col, 4.0 * row + col, f64::from(b'F')]).unwrap_or_else(|e| panic!("{e:?}"));
-    let again = phi(&[row, col, 4.0 * row + col, f64::from(b'F')]).unwrap();
+        phi(&[row, col, 4.0 * row + col, f64::from(b'F')], 1).unwrap_or_else(|e| panic!("{e:?}"));
+    let again = phi(&[row, col, 4.0 * row + col, f64::from(b'F')], 1).unwrap();
     assert_eq!(first.to_bits(), again.to_bits(), "a callback keeps nothing from call to call");
     first
 }

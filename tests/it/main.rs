@@ -1,6 +1,7 @@
 //! Integration tests: one binary, one module a subject.
 
 mod blackjack;
+mod book_figures;
 mod cli;
 mod crash;
 mod env;
@@ -10,13 +11,17 @@ mod golden;
 mod language;
 mod numbers;
 mod parity;
+mod placing;
 mod play;
+mod prediction;
 mod readme;
 mod refusals;
 mod render;
 mod scripts;
 mod setting;
 mod shaping;
+mod shaping_figures;
+mod shield;
 mod show;
 mod solved;
 mod support;

@@ -144,7 +144,7 @@ fn clipping_changes_what_is_learned_but_not_what_is_reported() {
         ))
     };
     let verdict =
-        |plan: &Plan| audit_variant(&Host::open(plan).unwrap(), only(plan)).unwrap().verdict;
+        |plan: &Plan| audit_variant(&Host::open(plan).unwrap(), only(plan), None).unwrap().label();
     assert_eq!(verdict(&lake("")), "unshaped");
     assert_eq!(verdict(&lake(", clip_reward: [-5, 1]")), "policy preserved");
     assert_eq!(verdict(&lake(", clip_reward: [0, 1]")), "policy changed");
@@ -155,14 +155,14 @@ fn skipped_frames_have_no_model_of_single_steps() {
     let keys = "env: \"FrozenLake-v1\", agent: q_learning(#{}), episodes: 3, frame_skip: 2";
     let verdict = |rest: &str| {
         let plan = plan(&format!("{keys}{rest}"));
-        let audit = audit_variant(&Host::open(&plan).unwrap(), only(&plan)).unwrap();
+        let audit = audit_variant(&Host::open(&plan).unwrap(), only(&plan), None).unwrap();
         // Whatever is said about it, it has to run.
         episodes(&plan);
-        audit.verdict
+        audit.verdict.as_str()
     };
     assert_eq!(verdict(""), "unshaped");
     assert_eq!(verdict(", potential: |s| s.row + s.col"), "potential-based");
-    assert_eq!(verdict(", reward: |t| t.reward - 0.01"), "not checked");
+    assert_eq!(verdict(", reward: |t| t.reward - 0.01"), "not-potential-based");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use runner::env::frozen_lake::FrozenLake;
 use runner::env::{AnyEnv, make};
 use runner::experiment::{EpisodeRow, Limits, World, train};
-use runner::learn::{Agent, Last, QTable};
+use runner::learn::{Agent, Last, Learn, QTable};
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::{Action, Ending};
 use runner::shaping::{CellPotential, NativeReward, NoPotential, Potential, StateIndex};
@@ -37,22 +37,6 @@ impl Scribe {
 }
 
 impl Agent for Scribe {
-    fn begin(&mut self, s: usize) -> Action {
-        self.states.push(s);
-        self.next += 1;
-        self.actions[self.next - 1]
-    }
-
-    fn step(&mut self, reward: f64, next: usize) -> Action {
-        self.rewards.push(reward);
-        self.begin(next)
-    }
-
-    fn end(&mut self, reward: f64, last: Last) {
-        self.rewards.push(reward);
-        self.last = Some(last);
-    }
-
     fn gamma(&self) -> f64 {
         GAMMA
     }
@@ -67,6 +51,24 @@ impl Agent for Scribe {
 
     fn q(&self) -> Option<&QTable> {
         None
+    }
+}
+
+impl Learn<usize> for Scribe {
+    fn begin(&mut self, s: usize) -> Action {
+        self.states.push(s);
+        self.next += 1;
+        self.actions[self.next - 1]
+    }
+
+    fn step(&mut self, reward: f64, next: usize) -> Action {
+        self.rewards.push(reward);
+        self.begin(next)
+    }
+
+    fn end(&mut self, reward: f64, last: Last) {
+        self.rewards.push(reward);
+        self.last = Some(last);
     }
 }
 
@@ -87,7 +89,7 @@ fn play<P: Potential<FrozenLake>>(potential: P, agent: &mut Scribe, max_steps: u
     let mut rng = NumpyRng::from_u64(0);
     let mut rows = Vec::new();
     let stop = AtomicBool::new(false);
-    assert!(train(&mut world, agent, limits, &mut rng, &stop, |row| rows.push(row)).is_ok());
+    assert!(train(&mut world, agent, limits, &mut rng, &stop, |row, _| rows.push(row)).is_ok());
     rows.remove(0)
 }
 

@@ -35,6 +35,12 @@ pub(super) fn decode(index: usize) -> (usize, usize, bool, bool) {
     }
 }
 
+/// Whether a hand can be this and be played: two cards make 4 or more, or 12 or more with a usable
+/// ace.
+pub(super) fn is_played(player: usize, dealer: usize, ace: bool) -> bool {
+    dealer > 0 && (if ace { 12 } else { 4 }..=21).contains(&player)
+}
+
 /// Which of a hit's outcomes it is, by the card.
 #[inline]
 pub(super) fn hit_outcome(card: u8) -> usize {
@@ -62,8 +68,7 @@ pub(super) fn model(rules: Rules) -> Result<FiniteMdp, FiniteMdpError> {
     let table: Vec<Vec<Vec<Outcome>>> = (0..N_STATES)
         .map(|s| {
             let (player, dealer, ace, natural) = decode(s);
-            // Sums that are played: two cards make 4 or more, or 12 or more with a usable ace.
-            if dealer == 0 || player > 21 || player < if ace { 12 } else { 4 } {
+            if !is_played(player, dealer, ace) {
                 return vec![vec![outcome(1.0, s, 0.0, true)]; 2];
             }
             let stick = ends[dealer].stick(s, player, natural, rules);

@@ -12,6 +12,7 @@ mod dynamics;
 mod error;
 mod evaluation;
 mod linear;
+mod planned_agent;
 mod policy_iteration;
 mod problem;
 mod solution;
@@ -21,9 +22,10 @@ pub use components::Components;
 pub use dynamics::{Dynamics, Over, Sources};
 pub use error::PlanError;
 pub use evaluation::{Policy, PolicyValue, policy_value};
+pub use planned_agent::PlannedAgent;
 pub use policy_iteration::{Optimum, PolicyIteration, Start};
 pub use problem::Problem;
-pub use solution::{PlannedAgent, Planner, Solution};
+pub use solution::{Planner, Solution, Sweep};
 pub use value_iteration::ValueIteration;
 
 #[cfg(test)]

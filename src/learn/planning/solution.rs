@@ -1,7 +1,7 @@
-//! What planners have in common, and the agent that plays what they found.
+//! What planners have in common.
 
 use super::PlanError;
-use crate::learn::{Agent, Last, QTable};
+use crate::learn::QTable;
 use crate::mdp::{Action, FiniteMdp};
 
 /// Solves a model.
@@ -18,6 +18,17 @@ pub trait Planner {
 
     /// The discount factor.
     fn gamma(&self) -> f64;
+}
+
+/// What a sweep over the states, or an iteration over policies, changed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep {
+    /// The largest change of a value.
+    pub change: f64,
+    /// No value is further than this from the optimum; `None` where that is not known.
+    pub bound: Option<f64>,
+    /// How many states it gave another action; `None` where policies are not what is iterated.
+    pub switched: Option<usize>,
 }
 
 /// What a planner found.
@@ -41,51 +52,19 @@ pub struct Solution {
     pub bound: Option<f64>,
 }
 
-/// Plays a planner's policy and learns nothing.
-#[derive(Debug, Clone)]
-pub struct PlannedAgent {
-    solution: Solution,
-    gamma: f64,
-}
-
-impl PlannedAgent {
-    /// Plays the solution's policy.
-    pub fn new(solution: Solution, gamma: f64) -> Self {
-        Self { solution, gamma }
-    }
-
-    /// What is played.
-    pub fn solution(&self) -> &Solution {
-        &self.solution
-    }
-}
-
-impl Agent for PlannedAgent {
-    #[inline]
-    fn begin(&mut self, s: usize) -> Action {
-        self.solution.policy[s]
-    }
-
-    #[inline]
-    fn step(&mut self, _reward: f64, next: usize) -> Action {
-        self.begin(next)
-    }
-
-    fn end(&mut self, _reward: f64, _last: Last) {}
-
-    fn gamma(&self) -> f64 {
-        self.gamma
-    }
-
-    fn bootstraps_when_truncated(&self) -> bool {
-        true
-    }
-
-    fn epsilon(&self) -> f64 {
-        0.0
-    }
-
-    fn q(&self) -> Option<&QTable> {
-        Some(&self.solution.q)
+impl Solution {
+    /// How the planner, which discounts by `gamma`, came closer to it: sweep by sweep. After a sweep
+    /// of value iteration the values are within `change · γ / (1 − γ)` of the optimum.
+    pub fn sweeps(&self, gamma: f64) -> Vec<Sweep> {
+        let last = self.changes.len().saturating_sub(1);
+        let sweep = |(i, &change): (usize, &f64)| {
+            let switched = self.switched.get(i).copied();
+            let bound = match switched {
+                None => (gamma < 1.0).then(|| change * gamma / (1.0 - gamma)),
+                Some(_) => self.bound.filter(|_| i == last),
+            };
+            Sweep { change, bound, switched }
+        };
+        self.changes.iter().enumerate().map(sweep).collect()
     }
 }

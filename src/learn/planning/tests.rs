@@ -282,7 +282,9 @@ proptest! {
             (v, v_shaped) = (plain.sweep(&v), shaped.sweep(&v_shaped));
             for s in 0..30 {
                 let error = (v_shaped[s] + phi[s] - v[s]).abs();
-                prop_assert!(error <= 1e-12, "sweep {}, state {}: {}", sweep, s, error);
+                // Undiscounted, values can grow by 1 a sweep.
+                let scale = v[s].abs().max(5.0);
+                prop_assert!(error <= 1e-12 * scale, "sweep {}, state {}: {}", sweep, s, error);
             }
         }
     }

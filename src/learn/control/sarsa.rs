@@ -4,28 +4,40 @@
 //!
 //! The book's order: A′ is chosen from S′ *before* the update, and is the action that is played.
 
-use super::tabular::Tabular;
-use super::{Agent, Last, QTable, Schedule};
+use super::Tabular;
+use super::tabular::agent_of_table;
+use crate::learn::{
+    EpsilonGreedy, Explore, Last, Learn, QTable, Rate, Schedule, ScheduleState, Seen,
+};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
-/// Tabular SARSA, ε-greedy.
+/// Tabular SARSA, on-policy; ε-greedy unless the behaviour says otherwise.
 ///
 /// Deviation 1: where an episode is truncated, the book has no rule; A′ is chosen from the last
 /// state as anywhere else, bootstrapped from, and not played.
 #[derive(Debug, Clone)]
-pub struct Sarsa(Tabular);
+pub struct Sarsa<B = EpsilonGreedy, A = ScheduleState>(Tabular<B, A>);
 
 impl Sarsa {
     /// A learner with the table `q`; exploration draws from `stream`.
     pub fn new(q: QTable, gamma: f64, alpha: Schedule, epsilon: Schedule, stream: Stream) -> Self {
-        Self(Tabular::new(q, gamma, alpha, epsilon, stream))
+        Self(Tabular::scheduled(q, gamma, alpha, epsilon, stream))
     }
 }
 
-impl Agent for Sarsa {
+impl<B: Explore, A: Rate> Sarsa<B, A> {
+    /// A learner with this table and behaviour.
+    pub fn of(table: Tabular<B, A>) -> Self {
+        Self(table)
+    }
+}
+
+agent_of_table!(Sarsa<B, A>, 0, B: Explore, A: Rate);
+
+impl<S: Seen, B: Explore, A: Rate> Learn<S> for Sarsa<B, A> {
     #[inline]
-    fn begin(&mut self, s: usize) -> Action {
+    fn begin(&mut self, s: S) -> Action {
         let a = self.0.choose(s);
         self.0.play(s, a)
     }
@@ -35,38 +47,22 @@ impl Agent for Sarsa {
         clippy::inline_always,
         reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
     )]
-    fn step(&mut self, reward: f64, next: usize) -> Action {
+    fn step(&mut self, reward: f64, next: S) -> Action {
         let a_next = self.0.choose(next);
-        self.0.update(reward, self.0.q.get(next, a_next));
+        self.0.update(reward, self.0.q.get(next.cell(), a_next));
         self.0.play(next, a_next)
     }
 
-    fn end(&mut self, reward: f64, last: Last) {
+    fn end(&mut self, reward: f64, last: Last<S>) {
         let q_next = match last {
             Last::Terminated => 0.0,
             Last::Truncated(next) => {
                 let a_next = self.0.choose(next);
-                self.0.q.get(next, a_next)
+                self.0.q.get(next.cell(), a_next)
             }
         };
         self.0.update(reward, q_next);
         self.0.end_episode();
-    }
-
-    fn gamma(&self) -> f64 {
-        self.0.gamma
-    }
-
-    fn bootstraps_when_truncated(&self) -> bool {
-        true
-    }
-
-    fn epsilon(&self) -> f64 {
-        self.0.epsilon()
-    }
-
-    fn q(&self) -> Option<&QTable> {
-        Some(&self.0.q)
     }
 }
 
@@ -84,7 +80,7 @@ mod tests {
         // 4 + 0.5 (-20 + 0.9 * 4 - 4) = -6.2.
         assert_eq!(agent.step(-20.0, 1), 0);
         assert_eq!(agent.0.q.get(1, 0), 4.0 + 0.5 * (-20.0 + 0.9 * 4.0 - 4.0));
-        agent.end(1.0, Last::Terminated);
+        agent.end(1.0, Last::<usize>::Terminated);
         let q = 4.0 + 0.5 * (-20.0 + 0.9 * 4.0 - 4.0);
         assert_eq!(agent.0.q.get(1, 0), q + 0.5 * (1.0 - q));
     }

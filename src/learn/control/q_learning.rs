@@ -5,25 +5,37 @@
 //! The book's order: choose A from S, observe R and S′, update, and only then choose the next
 //! action, from the updated values.
 
-use super::tabular::Tabular;
-use super::{Agent, Last, QTable, Schedule};
+use super::Tabular;
+use super::tabular::agent_of_table;
+use crate::learn::{
+    EpsilonGreedy, Explore, Last, Learn, QTable, Rate, Schedule, ScheduleState, Seen, max_allowed,
+};
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 
-/// Tabular Q-learning, ε-greedy.
+/// Tabular Q-learning, off-policy; ε-greedy unless the behaviour says otherwise.
 #[derive(Debug, Clone)]
-pub struct QLearning(Tabular);
+pub struct QLearning<B = EpsilonGreedy, A = ScheduleState>(Tabular<B, A>);
 
 impl QLearning {
     /// A learner with the table `q`; exploration draws from `stream`.
     pub fn new(q: QTable, gamma: f64, alpha: Schedule, epsilon: Schedule, stream: Stream) -> Self {
-        Self(Tabular::new(q, gamma, alpha, epsilon, stream))
+        Self(Tabular::scheduled(q, gamma, alpha, epsilon, stream))
     }
 }
 
-impl Agent for QLearning {
+impl<B: Explore, A: Rate> QLearning<B, A> {
+    /// A learner with this table and behaviour.
+    pub fn of(table: Tabular<B, A>) -> Self {
+        Self(table)
+    }
+}
+
+agent_of_table!(QLearning<B, A>, 0, B: Explore, A: Rate);
+
+impl<S: Seen, B: Explore, A: Rate> Learn<S> for QLearning<B, A> {
     #[inline]
-    fn begin(&mut self, s: usize) -> Action {
+    fn begin(&mut self, s: S) -> Action {
         let a = self.0.choose(s);
         self.0.play(s, a)
     }
@@ -33,35 +45,19 @@ impl Agent for QLearning {
         clippy::inline_always,
         reason = "with so many loops to put it into, the compiler prefers a call, which costs a third of the step"
     )]
-    fn step(&mut self, reward: f64, next: usize) -> Action {
-        let max_next = self.0.q.max(next);
+    fn step(&mut self, reward: f64, next: S) -> Action {
+        let max_next = max_allowed(self.0.q.row(next.cell()), next);
         self.0.update(reward, max_next);
         self.begin(next)
     }
 
-    fn end(&mut self, reward: f64, last: Last) {
+    fn end(&mut self, reward: f64, last: Last<S>) {
         let max_next = match last {
             Last::Terminated => 0.0,
-            Last::Truncated(next) => self.0.q.max(next),
+            Last::Truncated(next) => max_allowed(self.0.q.row(next.cell()), next),
         };
         self.0.update(reward, max_next);
         self.0.end_episode();
-    }
-
-    fn gamma(&self) -> f64 {
-        self.0.gamma
-    }
-
-    fn bootstraps_when_truncated(&self) -> bool {
-        true
-    }
-
-    fn epsilon(&self) -> f64 {
-        self.0.epsilon()
-    }
-
-    fn q(&self) -> Option<&QTable> {
-        Some(&self.0.q)
     }
 }
 
@@ -96,7 +92,7 @@ mod tests {
     fn termination_cuts_the_target_and_truncation_does_not() {
         let mut agent = greedy_learner();
         agent.begin(0);
-        agent.end(2.0, Last::Terminated);
+        agent.end(2.0, Last::<usize>::Terminated);
         assert_eq!(agent.0.q.get(0, 1), 1.0 + 0.5 * (2.0 - 1.0));
         let mut agent = greedy_learner();
         agent.begin(0);

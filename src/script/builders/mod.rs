@@ -1,23 +1,21 @@
 //! The functions with which a script builds its plan.
 
+mod agents;
+mod discretisers;
+
 use std::rc::Rc;
 
 use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, Map, NativeCallContext};
 
 use super::diagnostic::{Diagnostic, Place};
-use super::draft::{
-    AgentDraft, BinDraft, DiscretiserDraft, EnvDraft, ExperimentDraft, Located, Spot, StudyDraft,
-    captured_now, is_name,
-};
+use super::draft::{EnvDraft, ExperimentDraft, Located, Spot, StudyDraft, captured_now, is_name};
 use super::engine::Context;
-use super::params::{merge_agent, number, per_step, show, whole};
+use super::params::{number, show, whole};
 use super::plan::GoldenBudget;
 use super::setting::Entries;
+use super::shaping::LearnedPotential;
 use crate::env::frozen_lake::{MAX_TILES, random_map_within};
-use crate::learn::registry::{AGENTS, AgentSpec};
-use crate::learn::{AgentConfig, Schedule, Unit};
 use crate::mdp::numpy::Seed;
-use crate::shaping::MAX_CELLS;
 
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
 
@@ -85,18 +83,14 @@ impl<'a> Call<'a> {
 pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     engine.register_type_with_name::<ExperimentDraft>("experiment");
     engine.register_type_with_name::<StudyDraft>("study");
-    engine.register_type_with_name::<AgentDraft>("agent");
     engine.register_type_with_name::<EnvDraft>("environment");
-    engine.register_type_with_name::<DiscretiserDraft>("discretiser");
-    engine.register_type_with_name::<Schedule>("schedule");
+    engine.register_type_with_name::<LearnedPotential>("learned potential");
     experiments(engine, context);
     studies(engine, context);
     environments(engine, context);
-    for spec in AGENTS {
-        agent(engine, context, spec);
-    }
-    schedules(engine, context);
-    discretisers(engine, context);
+    agents::register(engine, context);
+    discretisers::register(engine, context);
+    potentials(engine, context);
 }
 
 fn experiments(engine: &mut Engine, context: &Rc<Context>) {
@@ -240,151 +234,13 @@ fn random_map(
     Ok(rows.into_iter().map(Dynamic::from).collect())
 }
 
-fn agent(engine: &mut Engine, context: &Rc<Context>, spec: &'static AgentSpec) {
-    let default = move || AgentDraft { spec, params: AgentConfig::new(spec).params };
-    engine.register_fn(spec.name, default);
+fn potentials(engine: &mut Engine, context: &Rc<Context>) {
     let c = context.clone();
-    engine.register_fn(spec.name, move |native: NativeCallContext, map: Map| {
+    engine.register_fn("learned", move |native: NativeCallContext, eta: Dynamic| {
         let call = Call::new(&c, &native);
-        let mut draft = default();
-        call.finish(merge_agent(&mut draft, &map, |key| call.key(key)).map(|()| draft))
+        let finite = number(&eta).filter(|eta| eta.is_finite()).map(LearnedPotential);
+        call.finish(finite.ok_or_else(|| {
+            Diagnostic::error(format!("`learned` takes a finite number, got {}", show(&eta)))
+        }))
     });
-}
-
-fn schedules(engine: &mut Engine, context: &Rc<Context>) {
-    type D = Dynamic;
-    let c = context.clone();
-    engine.register_fn("constant", move |native: NativeCallContext, value: Dynamic| {
-        let call = Call::new(&c, &native);
-        call.finish(finite(&call, 0, "the value", &value).map(Schedule::constant))
-    });
-    let unit = |steps: bool| if steps { Unit::Step } else { Unit::Episode };
-    let linear = move |call: &Call<'_>, [start, end, over]: [Dynamic; 3], options: &Map| {
-        call.finish((|| {
-            Ok(Schedule::Linear {
-                start: finite(call, 0, "the start", &start)?,
-                end: finite(call, 1, "the end", &end)?,
-                over: whole("the number of episodes or steps", &over, 1, i64::MAX)
-                    .map_err(|d| d.at(call.arg(2).place()))? as u64,
-                unit: unit(per_step(options, |key| call.key(key))?),
-            })
-        })())
-    };
-    let exponential = move |call: &Call<'_>, [start, factor, min]: [Dynamic; 3], options: &Map| {
-        call.finish((|| {
-            let factor = finite(call, 1, "the factor", &factor)?;
-            if !(factor > 0.0 && factor <= 1.0) {
-                return Err(Diagnostic::error(format!(
-                    "the factor of an exponential schedule is above 0 and at most 1, got {factor}"
-                ))
-                .at(call.arg(1).place()));
-            }
-            Ok(Schedule::Exponential {
-                start: finite(call, 0, "the start", &start)?,
-                factor,
-                min: finite(call, 2, "the minimum", &min)?,
-                unit: unit(per_step(options, |key| call.key(key))?),
-            })
-        })())
-    };
-    let c = context.clone();
-    engine.register_fn("linear", move |n: NativeCallContext, a: D, b: D, over: D| {
-        linear(&Call::new(&c, &n), [a, b, over], &Map::new())
-    });
-    let c = context.clone();
-    engine.register_fn("linear", move |n: NativeCallContext, a: D, b: D, over: D, options: Map| {
-        linear(&Call::new(&c, &n), [a, b, over], &options)
-    });
-    let c = context.clone();
-    engine.register_fn("exponential", move |n: NativeCallContext, a: D, factor: D, min: D| {
-        exponential(&Call::new(&c, &n), [a, factor, min], &Map::new())
-    });
-    let c = context.clone();
-    engine.register_fn(
-        "exponential",
-        move |n: NativeCallContext, a: D, factor: D, min: D, options: Map| {
-            exponential(&Call::new(&c, &n), [a, factor, min], &options)
-        },
-    );
-}
-
-/// The `i`-th argument of a schedule, a finite number.
-fn finite(call: &Call<'_>, i: usize, what: &str, value: &Dynamic) -> Result<f64, Diagnostic> {
-    number(value).filter(|x| x.is_finite()).ok_or_else(|| {
-        Diagnostic::error(format!("{what} of a schedule is a number, got {}", show(value)))
-            .at(call.arg(i).place())
-    })
-}
-
-fn discretisers(engine: &mut Engine, context: &Rc<Context>) {
-    let c = context.clone();
-    engine.register_fn("bins", move |native: NativeCallContext, map: Map| {
-        let call = Call::new(&c, &native);
-        let dims = map.iter().map(|(key, value)| bin(Ok(key.to_string()), value, call.key(key)));
-        call.finish(dims.collect::<Result<_, _>>().map(DiscretiserDraft::Bins))
-    });
-    let c = context.clone();
-    engine.register_fn("bins", move |native: NativeCallContext, list: Array| {
-        let call = Call::new(&c, &native);
-        let dims =
-            list.iter().enumerate().map(|(i, value)| bin(Err(i), value, call.key(&i.to_string())));
-        call.finish(dims.collect::<Result<_, _>>().map(DiscretiserDraft::Bins))
-    });
-    let c = context.clone();
-    engine.register_fn("cells", move |native: NativeCallContext, n: i64, cell: FnPtr| {
-        let call = Call::new(&c, &native);
-        call.finish(
-            shape(&[n.into()])
-                .map_err(|d| d.at(call.arg(0).place()))
-                .map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
-        )
-    });
-    let c = context.clone();
-    engine.register_fn("cells", move |native: NativeCallContext, sizes: Array, cell: FnPtr| {
-        let call = Call::new(&c, &native);
-        call.finish(
-            shape(&sizes)
-                .map_err(|d| d.at(call.arg(0).place()))
-                .map(|shape| DiscretiserDraft::Cells { shape, cell: captured_now(cell) }),
-        )
-    });
-}
-
-fn bin(field: Result<String, usize>, value: &Dynamic, spot: Spot) -> Result<BinDraft, Diagnostic> {
-    let label = || match &field {
-        Ok(name) => format!("`{name}`"),
-        Err(i) => format!("number {}", i + 1),
-    };
-    let wrong = || {
-        Diagnostic::error(format!("bin {} is [lo, hi, n], got {}", label(), show(value)))
-            .at(spot.place())
-    };
-    let list = value.read_lock::<Array>().ok_or_else(wrong)?;
-    let [lo, hi, n] = list.as_slice() else { return Err(wrong()) };
-    let (Some(lo), Some(hi)) = (number(lo), number(hi)) else { return Err(wrong()) };
-    let n = whole(&format!("the number of bins of {}", label()), n, 1, MAX_CELLS as i64)
-        .map_err(|d| d.at(spot.place()))? as usize;
-    if lo >= hi || !lo.is_finite() || !hi.is_finite() {
-        return Err(Diagnostic::error(format!(
-            "bin {} goes from {lo} to {hi}: the lower bound must be below the upper, both finite",
-            label()
-        ))
-        .at(spot.place()));
-    }
-    Ok(BinDraft { field, lo, hi, n, spot })
-}
-
-fn shape(sizes: &[Dynamic]) -> Result<Vec<usize>, Diagnostic> {
-    if sizes.is_empty() {
-        return Err(Diagnostic::error("`cells` needs at least one size"));
-    }
-    let sizes: Vec<usize> = sizes
-        .iter()
-        .map(|n| whole("the number of cells", n, 1, MAX_CELLS as i64).map(|n| n as usize))
-        .collect::<Result<_, _>>()?;
-    let total = sizes.iter().try_fold(1usize, |product, n| product.checked_mul(*n));
-    if total.is_none_or(|n| n > MAX_CELLS) {
-        return Err(Diagnostic::error(format!("more than {MAX_CELLS} cells: use fewer")));
-    }
-    Ok(sizes)
 }
