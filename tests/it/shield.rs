@@ -95,7 +95,11 @@ impl EnvVisitor for Temptation {
                 } else if exploration != Exploration::EpsilonGreedy {
                     continue;
                 }
-                let Build::Learner(build) = spec.build else { continue };
+                let (Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. }) =
+                    spec.build
+                else {
+                    continue;
+                };
                 let agent = build(&config, setup(&env)).boxed();
                 self.tempt(spec.name, &env, agent);
                 tried += 1;
@@ -111,7 +115,15 @@ fn setup<E: Env>(env: &E) -> Setup {
     let (n_states, n_actions) = (env.n_states().unwrap(), env.n_actions());
     let value = |i| if refused(i / n_actions).contains(i % n_actions) { 0.0 } else { TEMPTING };
     let initial_q = Some((0..n_states * n_actions).map(value).collect());
-    Setup { n_states, n_actions, seed: 3, stream: Stream::new(3, "agent"), initial_q }
+    Setup {
+        n_states,
+        n_actions,
+        seed: 3,
+        stream: Stream::new(3, "agent"),
+        initial_q,
+        initial_v: None,
+        policy: None,
+    }
 }
 
 impl Temptation {
@@ -173,9 +185,21 @@ impl EnvVisitor for OneCell {
             reward: NativeReward,
         };
         let spec = AGENTS.iter().find(|spec| spec.name == "sarsa_lambda").unwrap();
-        let Build::Learner(build) = spec.build else { panic!("a learner") };
+        let (Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. }) =
+            spec.build
+        else {
+            panic!("a learner")
+        };
         let stream = Stream::new(0, "agent");
-        let setup = Setup { n_states: 1, n_actions: 2, seed: 0, stream, initial_q: None };
+        let setup = Setup {
+            n_states: 1,
+            n_actions: 2,
+            seed: 0,
+            stream,
+            initial_q: None,
+            initial_v: None,
+            policy: None,
+        };
         let agent = build(&AgentConfig::new(spec), setup).boxed();
         let mut witness = Witness { agent, seen: Vec::new() };
         let limits = Limits { episodes: 20, max_steps: Some(500), ..Limits::EPISODE };

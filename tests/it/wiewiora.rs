@@ -100,11 +100,19 @@ fn agent(task: Task, (name, params): Learner, replayed: bool, q: QTable) -> Box<
         config.params.insert("epsilon", ParamValue::Schedule(Schedule::constant(1.0)));
         config.params.insert("exploration", ParamValue::Exploration(Exploration::EpsilonGreedy));
     }
-    let Build::Learner(build) = config.spec.build else { panic!("{name} is a learner") };
+    let (Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. }) =
+        config.spec.build
+    else {
+        panic!("{name} is a learner")
+    };
     let (n_states, n_actions) = (q.n_states(), q.n_actions());
     let stream = Stream::new(9, "agent");
     let initial_q = Some(q.values().to_vec());
-    build(&config, Setup { n_states, n_actions, seed: 9, stream, initial_q }).boxed()
+    build(
+        &config,
+        Setup { n_states, n_actions, seed: 9, stream, initial_q, initial_v: None, policy: None },
+    )
+    .boxed()
 }
 
 /// Writes down what an agent sees and does.
