@@ -20,6 +20,7 @@ mod setting;
 mod shaping;
 mod show;
 mod support;
+mod theory;
 mod toy_text;
 mod unreadable;
 mod variants;
