@@ -8,12 +8,15 @@
 //! between the two nothing is certain. A potential of 1e12 drowns the gaps of the plain model: where
 //! those are real but below `1e-8` of the shaped model's scale, its ties prove nothing either.
 
-use crate::learn::QTable;
-use crate::learn::planning::{PlanError, Planner, PolicyIteration};
-use crate::mdp::FiniteMdp;
+use serde::Serialize;
+
+use super::gap::{Gap, Scale, best};
+use super::pair::{Pair, Unsolved};
+use crate::mdp::{Action, FiniteMdp};
 
 /// What comes of the comparison.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The greedy action sets are equal in every reachable state.
     Preserved,
@@ -35,7 +38,7 @@ impl Verdict {
 }
 
 /// A comparison of two models that differ in their rewards.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Preservation {
     /// Preserved, changed or inconclusive.
     pub verdict: Verdict,
@@ -44,10 +47,10 @@ pub struct Preservation {
     /// `max |Q_F + Φ − Q|` over reachable states, relative to the larger scale (at least 1): at most
     /// 1e-9 for a correct potential.
     pub identity_error: f64,
-    /// Greedy sets of the plain model, one per state.
-    pub plain: Vec<Vec<usize>>,
-    /// Greedy sets of the shaped model, one per state.
-    pub shaped: Vec<Vec<usize>>,
+    /// Greedy sets of the plain model, one per state; empty where no episode can be.
+    pub plain: Vec<Vec<Action>>,
+    /// Greedy sets of the shaped model, likewise.
+    pub shaped: Vec<Vec<Action>>,
 }
 
 impl Preservation {
@@ -61,95 +64,76 @@ impl Preservation {
 /// the states that are reachable. `phi` holds one value per state, all 0 without a potential.
 ///
 /// # Errors
-/// If a policy has no value: with γ = 1, episodes that may never end.
+/// If γ = 1 and either is no stochastic shortest path problem, or a value is not finite.
 pub fn preservation(
     plain: &FiniteMdp,
     shaped: &FiniteMdp,
     gamma: f64,
     phi: &[f64],
-) -> Result<Preservation, PlanError> {
-    let reachable = plain.reachable();
-    let zero = vec![0.0; phi.len()];
-    let minus_phi: Vec<f64> = phi.iter().map(|phi| -phi).collect();
-    let q = PolicyIteration { gamma }.solve(plain, &zero)?.q;
-    let q_shaped = PolicyIteration { gamma }.solve(shaped, &minus_phi)?.q;
-    let scale = scale_of(plain, &q, &zero, &reachable);
-    let scale_shaped = scale_of(shaped, &q_shaped, phi, &reachable);
-    let (mut identity_error, mut uncertain) = (0.0f64, false);
-    let mut states_changed = Vec::new();
-    let (mut sets, mut sets_shaped) = (Vec::new(), Vec::new());
-    for s in 0..plain.n_states() {
-        let (row, row_shaped) = (q.row(s), q_shaped.row(s));
-        sets.push(tied(row, scale));
-        sets_shaped.push(tied(row_shaped, scale_shaped));
-        if !reachable[s] {
-            continue;
-        }
-        for (a, b) in row.iter().zip(row_shaped) {
-            let size = scale.max(scale_shaped).max(1.0);
-            identity_error = identity_error.max((b + phi[s] - a).abs() / size);
-        }
-        match compare(row, scale, row_shaped, scale_shaped) {
-            Some(true) => {}
-            Some(false) => states_changed.push(s),
-            None => uncertain = true,
-        }
-    }
-    let verdict = match (states_changed.is_empty(), uncertain) {
-        (false, _) => Verdict::Changed,
-        (true, true) => Verdict::Inconclusive,
-        (true, false) => Verdict::Preserved,
-    };
-    Ok(Preservation { verdict, states_changed, identity_error, plain: sets, shaped: sets_shaped })
+) -> Result<Preservation, Unsolved> {
+    Ok(Pair::of_models(plain, shaped, gamma)?.preservation(phi))
 }
 
-/// The largest |Q|, |r| and |Φ| over reachable states.
-fn scale_of(mdp: &FiniteMdp, q: &QTable, phi: &[f64], reachable: &[bool]) -> f64 {
-    let mut scale = 0.0f64;
-    for s in (0..mdp.n_states()).filter(|&s| reachable[s]) {
-        scale = scale.max(phi[s].abs());
-        for a in 0..mdp.n_actions() {
-            scale = scale.max(q.get(s, a).abs());
-            for o in mdp.of(s, a) {
-                scale = scale.max(o.reward.abs());
+impl Pair {
+    /// Compares the greedy sets. `phi` holds one value per state of the model: all 0 without a
+    /// potential.
+    pub fn preservation(&self, phi: &[f64]) -> Preservation {
+        let n_actions = self.dynamics.n_actions();
+        let phi: Vec<f64> =
+            (0..self.dynamics.len()).map(|place| phi[self.dynamics.state(place)]).collect();
+        let (q, q_shaped) = (&self.native.optimum.q, &self.learned.optimum.q);
+        let scale = Scale::new(&self.native, 0.0);
+        let largest_phi = phi.iter().fold(0.0f64, |m, phi| m.max(phi.abs()));
+        let scale_shaped = Scale::new(&self.learned, largest_phi);
+        let size = scale.size.max(scale_shaped.size).max(1.0);
+        let mut result = Preservation {
+            verdict: Verdict::Preserved,
+            states_changed: Vec::new(),
+            identity_error: 0.0,
+            plain: vec![Vec::new(); self.dynamics.n_model_states()],
+            shaped: vec![Vec::new(); self.dynamics.n_model_states()],
+        };
+        let mut uncertain = false;
+        for (place, phi) in phi.iter().enumerate() {
+            let s = self.dynamics.state(place);
+            let row = &q[place * n_actions..][..n_actions];
+            let row_shaped = &q_shaped[place * n_actions..][..n_actions];
+            result.plain[s] = tied(row, &scale);
+            result.shaped[s] = tied(row_shaped, &scale_shaped);
+            for (a, b) in row.iter().zip(row_shaped) {
+                result.identity_error = result.identity_error.max((b + phi - a).abs() / size);
+            }
+            match compare(row, &scale, row_shaped, &scale_shaped) {
+                Some(true) => {}
+                Some(false) => result.states_changed.push(s),
+                None => uncertain = true,
             }
         }
-    }
-    scale
-}
-
-/// How far an action is below the best: nothing, something, or too close to call.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Gap {
-    Tie,
-    Unclear,
-    Real,
-}
-
-fn gap(row: &[f64], a: usize, scale: f64) -> Gap {
-    let best = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    match best - row[a] {
-        gap if gap <= 1e-11 * scale => Gap::Tie,
-        gap if gap >= 1e-8 * scale => Gap::Real,
-        _ => Gap::Unclear,
+        result.verdict = match (result.states_changed.is_empty(), uncertain) {
+            (false, _) => Verdict::Changed,
+            (true, true) => Verdict::Inconclusive,
+            (true, false) => Verdict::Preserved,
+        };
+        result
     }
 }
 
 /// The actions that are not clearly below the best.
-fn tied(row: &[f64], scale: f64) -> Vec<usize> {
-    (0..row.len()).filter(|&a| gap(row, a, scale) != Gap::Real).collect()
+fn tied(row: &[f64], scale: &Scale) -> Vec<Action> {
+    (0..row.len()).filter(|&a| scale.gap(row, a) != Gap::Real).collect()
 }
 
 /// Whether the greedy sets of a state are equal; `None` if that cannot be said.
-fn compare(row: &[f64], scale: f64, shaped: &[f64], scale_shaped: f64) -> Option<bool> {
-    let best = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+fn compare(row: &[f64], scale: &Scale, shaped: &[f64], scale_shaped: &Scale) -> Option<bool> {
     let mut equal = Some(true);
     for a in 0..row.len() {
-        match (gap(row, a, scale), gap(shaped, a, scale_shaped)) {
+        match (scale.gap(row, a), scale_shaped.gap(shaped, a)) {
             (Gap::Tie, Gap::Tie) | (Gap::Real, Gap::Real) => {}
             (Gap::Tie, Gap::Real) => return Some(false),
             // Had the shaping kept the gap, would it have been seen?
-            (Gap::Real, Gap::Tie) if best - row[a] >= 1e-8 * scale_shaped => return Some(false),
+            (Gap::Real, Gap::Tie) if best(row) - row[a] >= scale_shaped.real() => {
+                return Some(false);
+            }
             _ => equal = None,
         }
     }
@@ -220,6 +204,28 @@ mod tests {
             let scaled = mdp.with_rewards(|_, _, o| k * o.reward);
             let result = preservation(&mdp, &scaled, 1.0, &[0.0; 3]).unwrap();
             assert_eq!(result.verdict, Verdict::Preserved, "times {k}");
+        }
+    }
+
+    /// A constant potential that terminal states have too is a living cost of (1 − γ) c: to exit for
+    /// 1 now or for 1.2 in the next step changes places at γ = 0.9, c = 1.
+    #[test]
+    fn a_constant_potential_must_leave_out_terminal_states() {
+        let go = |next_state, reward, terminated| {
+            vec![Outcome { probability: 1.0, next_state, reward, terminated }]
+        };
+        let (now, later) = (go(1, 1.0, true), go(1, 0.0, false));
+        let mdp =
+            FiniteMdp::new(&[vec![now, later], vec![go(1, 1.2, true); 2]], vec![1.0, 0.0]).unwrap();
+        let phi = [1.0; 2];
+        let right = preservation(&mdp, &shaped_model(&mdp, 0.9, &phi), 0.9, &phi).unwrap();
+        assert_eq!(right.verdict, Verdict::Preserved);
+        assert_eq!(right.plain[0], [1]);
+        let wrong = mdp.with_rewards(|_, _, o| o.reward + 0.9 - 1.0);
+        let wrong = Pair::of_models(&mdp, &wrong, 0.9).unwrap();
+        assert_eq!(wrong.preservation(&[0.0; 2]).shaped[0], [0]);
+        for (q, expected) in wrong.learned.optimum.q.iter().zip([0.9, 0.89]) {
+            assert!((q - expected).abs() < 1e-12);
         }
     }
 }

@@ -27,7 +27,7 @@ pub struct SampledSettings {
     pub n_cells: usize,
     /// States that are drawn from each cell, 1 or more.
     pub samples: usize,
-    /// Episodes whose first state is looked at: the model's initial distribution.
+    /// Episodes whose first state is looked at, 1 or more: the model's initial distribution.
     pub starts: usize,
     /// The learner's discount factor γ.
     pub gamma: f64,

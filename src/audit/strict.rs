@@ -112,7 +112,8 @@ pub fn strict(
 ) -> Strict {
     let forest = Forest::new(mdp, reachable);
     let recovered = recover(mdp, f, gamma, &forest, Beyond::Zero, declared);
-    let check = check(mdp, f, gamma, &forest, &recovered);
+    let magnitude = magnitude(mdp, f, &forest);
+    let check = check(mdp, f, gamma, &forest, &recovered, magnitude);
     let finding = match check.finding() {
         Finding::Fails if !recovered.sound => Finding::Inconclusive,
         finding => finding,
@@ -120,7 +121,10 @@ pub fn strict(
     let proof = check.shortest.filter(|_| finding == Finding::Fails);
     let certificate = proof.map(|(_, at)| certificate(mdp, f, gamma, &forest, at));
     let diagnosis = (finding == Finding::Fails)
-        .then(|| diagnosis::diagnose(mdp, f, gamma, &forest, certificate.as_ref(), declared))
+        .then(|| {
+            let question = Question { mdp, f, gamma, forest: &forest, magnitude, declared };
+            diagnosis::diagnose(&question, certificate.as_ref())
+        })
         .flatten();
     Strict {
         finding,
@@ -157,14 +161,37 @@ impl Check {
     }
 }
 
-fn check(mdp: &FiniteMdp, f: &[f64], gamma: f64, forest: &Forest, recovered: &Recovered) -> Check {
-    let mut scale = recovered.anchors.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+/// What a diagnosis is made for.
+#[derive(Debug, Clone, Copy)]
+struct Question<'a> {
+    mdp: &'a FiniteMdp,
+    f: &'a [f64],
+    gamma: f64,
+    forest: &'a Forest,
+    magnitude: f64,
+    declared: Option<&'a [f64]>,
+}
+
+/// The largest |r| and |F|.
+fn magnitude(mdp: &FiniteMdp, f: &[f64], forest: &Forest) -> f64 {
+    let mut largest = 0.0f64;
     for &s in &forest.order {
-        scale = scale.max(recovered.phi[s as usize].abs());
         for (i, o) in leaving(mdp, s as usize) {
-            scale = scale.max(o.reward.abs()).max(f[i].abs());
+            largest = largest.max(o.reward.abs()).max(f[i].abs());
         }
     }
+    largest
+}
+
+fn check(
+    mdp: &FiniteMdp,
+    f: &[f64],
+    gamma: f64,
+    forest: &Forest,
+    recovered: &Recovered,
+    magnitude: f64,
+) -> Check {
+    let scale = recovered.scale(magnitude);
     let mut check = Check { transitions: 0, violations: 0, largest: 0.0, scale, shortest: None };
     let mut first = vec![usize::MAX; 2 * mdp.n_states()];
     let reached = |s: &usize| forest.anchor[*s] != forest::NONE;

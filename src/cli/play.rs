@@ -9,6 +9,7 @@ use super::view::{View, ViewArgs};
 use super::{Failure, Outcome};
 use crate::env::Session;
 use crate::env::rollout::{Event, Length};
+use crate::experiment::Values;
 use crate::experiment::play::{PlayedEpisode, Policy, play, session};
 use crate::mdp::numpy::Seed;
 use crate::report::stored::Stored;
@@ -48,14 +49,23 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let index = stored.variant(args.variant.as_deref())?;
     let variant = &stored.plan.variants[index];
     let unit = stored.unit(index, args.seed)?;
-    let learned = stored.learned(unit)?;
+    let Values::Q(q) = stored.learned(unit)?.values else {
+        return Err(Failure::Message(
+            format!(
+                "variant `{}` has no policy of its own: its agent `{}` learns the values of one that \
+                 is given",
+                variant.name, variant.agent.spec.name
+            ),
+            Some(format!("to see random play: runner rollout {} --policy random", variant.env.id)),
+        ));
+    };
     if args.variant.is_none() && stored.plan.variants.len() > 1 {
         let names: Vec<&str> = stored.plan.variants.iter().map(|v| v.name.as_str()).collect();
         note(&format!("playing `{}`; --variant chooses among {}", variant.name, names.join(", ")));
     }
     let host = Host::open(&stored.plan)?;
     let mut session = session(variant)?;
-    let mut policy = Policy::new(&host, variant, &session, learned.q);
+    let mut policy = Policy::new(&host, variant, &session, q);
     let endless = if variant.max_steps.is_some() { usize::MAX } else { ENDLESS };
     let length = Length {
         steps: args.steps.map_or(endless, |n| usize::try_from(n).unwrap_or(usize::MAX)),

@@ -1,9 +1,10 @@
 //! Puts together what a variant describes: discretiser, reward, agent.
 
+use super::predict::{Exact, given_policy};
 use super::shaped::{learner, potential};
 use super::shielded::playable;
 use crate::learn::AnyAgent;
-use crate::learn::planning::PlannedAgent;
+use crate::learn::planning::{PlannedAgent, Sweep};
 use crate::learn::registry::{Build, Setup};
 use crate::mdp::streams::Stream;
 use crate::mdp::{Env, FiniteMdp, Schema};
@@ -64,6 +65,46 @@ pub(super) fn shield<E: Env>(host: &Host, variant: &Variant, env: &E) -> Option<
     Some(Shield::new(schema.fields.len(), env.n_states().unwrap_or(0), allowed))
 }
 
+/// Calls `each(cell, fields)` for every cell with the fields of the state that stands for it; not for
+/// states that cannot be reached, which may be junk.
+pub(super) fn for_each_cell<E: Env + Clone + 'static>(
+    variant: &Variant,
+    env: &E,
+    n_cells: usize,
+    mut each: impl FnMut(usize, &[f64]) -> Result<(), Fault>,
+) -> Result<(), Fault> {
+    let n_fields = env.schema().fields.len();
+    let fields_of = representative(variant, env).expect("refused when the plan was resolved");
+    let reachable = match variant.discretiser {
+        DiscretiserSpec::StateIndex => env.finite().map(|mdp| mdp.reachable()),
+        _ => None,
+    };
+    for cell in 0..n_cells {
+        if reachable.as_ref().is_none_or(|reachable| reachable[cell]) {
+            each(cell, &fields_of(cell)[..n_fields])?;
+        }
+    }
+    Ok(())
+}
+
+/// A number for every cell, called `what` in messages; 0 in states that cannot be reached.
+fn of_state<E: Env + Clone + 'static>(
+    host: &Host,
+    variant: &Variant,
+    env: &E,
+    n_cells: usize,
+    callback: &Callback,
+    what: &'static str,
+) -> Result<Vec<f64>, Fault> {
+    let mut number = host.callbacks().of_action(callback, what, &env.schema());
+    let mut values = vec![0.0; n_cells];
+    for_each_cell(variant, env, n_cells, |cell, fields| {
+        values[cell] = number(fields, 0)?;
+        Ok(())
+    })?;
+    Ok(values)
+}
+
 /// A number for every cell and action, shape `[n_cells, n_actions]`, called `what` in messages;
 /// 0 in states that cannot be reached.
 pub(super) fn of_action<E: Env + Clone + 'static>(
@@ -74,21 +115,11 @@ pub(super) fn of_action<E: Env + Clone + 'static>(
     callback: &Callback,
     what: &'static str,
 ) -> Result<Vec<f64>, Fault> {
-    let schema = env.schema();
-    let mut number = host.callbacks().of_action(callback, what, &schema);
-    let fields_of = representative(variant, env).expect("refused when the plan was resolved");
-    let reachable = match variant.discretiser {
-        DiscretiserSpec::StateIndex => env.finite().map(|mdp| mdp.reachable()),
-        _ => None,
-    };
+    let mut number = host.callbacks().of_action(callback, what, &env.schema());
     let n_actions = env.n_actions();
     let mut values = vec![0.0; n_cells * n_actions];
-    for (cell, row) in values.chunks_exact_mut(n_actions).enumerate() {
-        if reachable.as_ref().is_some_and(|reachable| !reachable[cell]) {
-            continue;
-        }
-        let fields = fields_of(cell);
-        let fields = &fields[..schema.fields.len()];
+    for_each_cell(variant, env, n_cells, |cell, fields| {
+        let row = &mut values[cell * n_actions..][..n_actions];
         let of_state = if callback.arity == 1 { Some(number(fields, 0)?) } else { None };
         for (action, value) in row.iter_mut().enumerate() {
             *value = match of_state {
@@ -96,7 +127,8 @@ pub(super) fn of_action<E: Env + Clone + 'static>(
                 None => number(fields, action)?,
             };
         }
-    }
+        Ok(())
+    })?;
     Ok(values)
 }
 
@@ -253,38 +285,58 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
     Ok(LearnedModel { shaped, phi })
 }
 
-/// The variant's agent for one seed, and a planner's largest change per sweep.
+/// An agent, and what is known about what it does.
+pub(super) struct Assembled {
+    pub(super) agent: AnyAgent,
+    /// How a planner came to its solution; empty for learners.
+    pub(super) sweeps: Vec<Sweep>,
+    /// What a predictor should learn, where there is a model.
+    pub(super) exact: Option<Exact>,
+}
+
+/// The variant's agent for one seed.
 pub(super) fn agent<E: Env + Clone + 'static>(
     host: &Host,
     variant: &Variant,
     env: &E,
     n_cells: usize,
     seed: u64,
-) -> Result<(AnyAgent, Vec<f64>), Fault> {
+) -> Result<Assembled, Fault> {
     match variant.agent.spec.build {
-        Build::Learner(build) | Build::OnPolicy { build, .. } | Build::OneStep { build, .. } => {
-            let initial_q = match variant.agent_functions.get("initial_q") {
-                Some(f) => {
-                    Some(of_action(host, variant, env, n_cells, f, "the initial action value")?)
-                }
-                None => None,
-            };
+        Build::Learner(build)
+        | Build::Predictor(build)
+        | Build::OnPolicy { build, .. }
+        | Build::OneStep { build, .. } => {
+            let function = |name: &str| variant.agent_functions.get(name);
+            let initial_q = function("initial_q")
+                .map(|f| of_action(host, variant, env, n_cells, f, "the initial action value"));
+            let initial_v = function("initial_v")
+                .map(|f| of_state(host, variant, env, n_cells, f, "the initial state value"));
+            let (mut policy, mut exact) = (None, None);
+            if variant.agent.is_predictor() {
+                policy = given_policy(host, variant, env, n_cells)?;
+                exact = Exact::new(host, variant, env, policy.as_deref())?;
+            }
             let setup = Setup {
                 n_states: n_cells,
                 n_actions: env.n_actions(),
                 seed,
                 stream: Stream::new(seed, "agent"),
-                initial_q,
+                initial_q: initial_q.transpose()?,
+                initial_v: initial_v.transpose()?,
+                policy,
             };
-            Ok((learner(host, variant, env, build, setup)?, Vec::new()))
+            let agent = learner(host, variant, env, build, setup)?;
+            Ok(Assembled { agent, sweeps: Vec::new(), exact })
         }
         Build::Planner(build) => {
             let planner = build(&variant.agent);
             let model = learned_model(host, variant, env)?;
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
             let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
-            let sweeps = solution.changes.clone();
-            Ok((AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma())), sweeps))
+            let sweeps = solution.sweeps(planner.gamma());
+            let agent = AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma()));
+            Ok(Assembled { agent, sweeps, exact: None })
         }
     }
 }

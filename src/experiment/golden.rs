@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::audit::{Audit, audit_variant};
 use super::hex;
-use super::record::UnitRecord;
+use super::record::{StateValues, UnitRecord};
 use super::unit::{UnitError, run_unit};
 use crate::env::EnvVisitor;
 use crate::learn::{QTable, greedy_sets};
@@ -62,6 +62,9 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         };
         writeln!(out, "  seed {seed}").expect(MEMORY);
         returns(variant, &record, out);
+        if let Some(values) = &record.values {
+            state_values(&record, values, out);
+        }
         if let Some(q) = &record.q {
             let sets = greedy_sets(q);
             writeln!(out, "    greedy sets {} of {} states", digest(&sets), sets.len())
@@ -101,6 +104,17 @@ fn returns(variant: &Variant, record: &UnitRecord, out: &mut String) {
     });
     writeln!(out, "    return {}", points.join(", ")).expect(MEMORY);
     writeln!(out, "    steps {}", record.steps()).expect(MEMORY);
+}
+
+/// What a predictor learned: its error, where it is known, and a digest of the values.
+fn state_values(record: &UnitRecord, values: &StateValues, out: &mut String) {
+    if let Some(error) = record.rows.last().and_then(|row| row.value_error) {
+        writeln!(out, "    value error {error:.6}").expect(MEMORY);
+    }
+    let mut hash = Sha256::new();
+    values.v.iter().for_each(|v| hash.update(v.to_bits().to_le_bytes()));
+    let digest = hex(&hash.finalize()[..8]);
+    writeln!(out, "    values {digest} of {} states", values.v.len()).expect(MEMORY);
 }
 
 /// Pins every set without listing them all.

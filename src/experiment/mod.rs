@@ -16,9 +16,12 @@ mod execute;
 pub mod golden;
 mod landscape;
 pub mod play;
+mod predict;
 mod record;
+mod score;
 mod shaped;
 mod shielded;
+mod starts;
 mod store;
 mod train;
 mod unit;
@@ -39,7 +42,9 @@ pub use audit::{
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use landscape::{Landscape, ListedState};
-pub use record::{EpisodeRow, Learned, UnitRecord};
+pub use predict::has_exact_values;
+pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
+pub use score::{Scored, score_variant};
 pub use store::{
     Store, StoreError, StoredUnit, read_table, write_atomically, write_atomically_with,
 };

@@ -1,6 +1,7 @@
 //! What a unit leaves behind.
 
 use crate::learn::QTable;
+use crate::learn::planning::Sweep;
 use crate::mdp::Ending;
 
 /// One episode.
@@ -20,6 +21,10 @@ pub struct EpisodeRow {
     pub epsilon: f64,
     /// How it ended.
     pub ending: Ending,
+    /// The error of the values of a predictor after it: root mean square over the states that its
+    /// policy reaches. `None` for other agents, without a model, and in between where many episodes
+    /// make it costly.
+    pub value_error: Option<f64>,
 }
 
 /// Everything one unit produced.
@@ -29,15 +34,53 @@ pub struct UnitRecord {
     pub rows: Vec<EpisodeRow>,
     /// The action values learned, if the agent keeps any.
     pub q: Option<QTable>,
-    /// A planner's largest change per sweep; empty for learners.
-    pub sweeps: Vec<f64>,
+    /// The state values learned, if they are what the agent learns.
+    pub values: Option<StateValues>,
+    /// How a planner came to its solution; empty for learners.
+    pub sweeps: Vec<Sweep>,
 }
 
-/// Action values read back from a store.
+/// State values with what they should be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateValues {
+    /// Those learned, one per state.
+    pub v: Vec<f64>,
+    /// The exact ones, `None` in states that the policy does not reach; empty without a model.
+    pub exact: Vec<Option<f64>>,
+}
+
+/// What an agent learns of states.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Action values.
+    Q(QTable),
+    /// State values of a policy that was given, one per state.
+    V(Vec<f64>),
+}
+
+impl Values {
+    /// The value of a state: of the best action, or of the policy.
+    pub fn of(&self, s: usize) -> f64 {
+        match self {
+            Self::Q(q) => q.max(s),
+            Self::V(v) => v[s],
+        }
+    }
+
+    /// The action values, if that is what they are.
+    pub fn q(&self) -> Option<&QTable> {
+        match self {
+            Self::Q(q) => Some(q),
+            Self::V(_) => None,
+        }
+    }
+}
+
+/// What was learned, read back from a store.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     /// The values; the agent's initial one where nothing was learned.
-    pub q: QTable,
+    pub values: Values,
     /// Whether anything was learned in a state, one flag each.
     pub experienced: Vec<bool>,
 }

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::record::EpisodeRow;
+use super::starts::Starts;
 use crate::learn::{Last, Learn, Seen};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Ending, Env, Step};
@@ -34,12 +35,21 @@ pub struct Limits {
     pub frame_skip: u32,
     /// The range to which the learned reward is clipped before the potential's part is added.
     pub clip_reward: Option<[f64; 2]>,
+    /// Draws the first state of every episode from all that the environment's model can reach, by
+    /// a stream of this seed, instead of the environment's own.
+    pub exploring_starts: Option<u64>,
 }
 
 impl Limits {
     /// One episode without a time limit, and nothing out of the ordinary.
-    pub const EPISODE: Self =
-        Self { episodes: 1, max_steps: None, n_terms: 0, frame_skip: 1, clip_reward: None };
+    pub const EPISODE: Self = Self {
+        episodes: 1,
+        max_steps: None,
+        n_terms: 0,
+        frame_skip: 1,
+        clip_reward: None,
+        exploring_starts: None,
+    };
 }
 
 /// Why training ended early.
@@ -92,12 +102,13 @@ where
     R: RewardModel<E>,
     A: Learn<D::State>,
 {
+    let mut starts = limits.exploring_starts.and_then(|seed| Starts::new(&world.env, seed));
     for episode in 0..limits.episodes {
         if stop.load(Ordering::Relaxed) {
             return Err(TrainError::Interrupted);
         }
         world.potential.begin_episode(episode + 1);
-        match play(world, agent, limits, rng, stop) {
+        match play(world, agent, limits, starts.as_mut(), rng, stop) {
             Ok(row) if !row.learned.is_finite() => return Err(TrainError::NotFinite { episode }),
             Ok(row) => each(row, agent),
             Err((None, _)) => return Err(TrainError::Interrupted),
@@ -136,6 +147,7 @@ fn play<E, D, P, R, A>(
     world: &mut World<E, D, P, R>,
     agent: &mut A,
     limits: Limits,
+    starts: Option<&mut Starts>,
     rng: &mut NumpyRng,
     stop: &AtomicBool,
 ) -> Result<EpisodeRow, (Option<Fault>, u32)>
@@ -155,6 +167,9 @@ where
     let (mut native, mut learned, mut shaping) = (0.0, 0.0, 0.0);
 
     let mut obs = env.reset(rng);
+    if let Some(starts) = starts {
+        obs = starts.place(env);
+    }
     let start = discretiser.see(env, &obs).map_err(|f| (Some(f), 0))?;
     let mut phi = potential.phi(env, start.cell(), &obs).map_err(|f| (Some(f), 0))?;
     let mut action = agent.begin(start);
@@ -219,6 +234,7 @@ where
                     terms,
                     epsilon,
                     ending,
+                    value_error: None,
                 });
             }
         };

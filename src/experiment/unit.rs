@@ -4,10 +4,13 @@ use std::sync::atomic::AtomicBool;
 
 use sha2::{Digest, Sha256};
 
-use super::record::{EpisodeRow, UnitRecord};
+use super::assemble::Assembled;
+use super::predict::Exact;
+use super::record::{EpisodeRow, StateValues, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
 use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
+use crate::learn::planning::Sweep;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
 use crate::learn::{AnyAgent, Learn};
 use crate::mdp::Env;
@@ -20,7 +23,7 @@ use crate::shaping::{
 
 /// Raised whenever the same configuration gives other results than before: old units are then not
 /// taken for new ones.
-pub const SEMANTICS: u32 = 1;
+pub const SEMANTICS: u32 = 2;
 
 /// Whether the commonest combinations get loops of their own. Not when debugging: they are most of
 /// what there is to compile, and the shared loop gives the same results.
@@ -162,7 +165,14 @@ struct Parts<E: Env> {
     potential: AnyPotential,
     reward: AnyReward<E>,
     agent: AnyAgent,
-    sweeps: Vec<f64>,
+    /// What else the unit leaves behind.
+    extra: Extra,
+}
+
+/// What a unit knows about its agent beyond what it learns.
+struct Extra {
+    sweeps: Vec<Sweep>,
+    exact: Option<Exact>,
 }
 
 impl RunUnit<'_> {
@@ -175,8 +185,9 @@ impl RunUnit<'_> {
         let fault = |f| UnitError::fault(variant, seed, f);
         let potential = shaped::potential(host, variant, env, n_cells).map_err(fault)?;
         let reward = assemble::reward(host, variant, env).map_err(fault)?;
-        let (agent, sweeps) = assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;
-        Ok(Parts { potential, reward, agent, sweeps })
+        let Assembled { agent, sweeps, exact } =
+            assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;
+        Ok(Parts { potential, reward, agent, extra: Extra { sweeps, exact } })
     }
 
     /// The commonest agents have loops of their own, for plain and potential-only rewards and for
@@ -186,12 +197,12 @@ impl RunUnit<'_> {
         E: Env + Clone + 'static,
         D: Discretiser<E, State = usize>,
     {
-        let Parts { potential, reward, agent, sweeps } = self.parts(&env, discretiser.n_cells())?;
+        let Parts { potential, reward, agent, extra } = self.parts(&env, discretiser.n_cells())?;
         if !agent.is_fast() {
             let world = World { env, discretiser, potential, reward };
-            return self.train(world, agent.boxed(), sweeps);
+            return self.train(world, agent.boxed(), extra);
         }
-        let unit = (self, sweeps);
+        let unit = (self, extra);
         match (potential, reward) {
             (AnyPotential::No(_), AnyReward::Native(_)) => {
                 let (potential, reward) = (NoPotential, NativeReward);
@@ -213,15 +224,15 @@ impl RunUnit<'_> {
         D: Discretiser<E>,
         Box<dyn TabularAgent>: Learn<D::State>,
     {
-        let Parts { potential, reward, agent, sweeps } = self.parts(&env, discretiser.n_cells())?;
-        self.train(World { env, discretiser, potential, reward }, agent.boxed(), sweeps)
+        let Parts { potential, reward, agent, extra } = self.parts(&env, discretiser.n_cells())?;
+        self.train(World { env, discretiser, potential, reward }, agent.boxed(), extra)
     }
 
     fn train<E, D, P, R, A>(
         self,
         mut world: World<E, D, P, R>,
         mut agent: A,
-        sweeps: Vec<f64>,
+        extra: Extra,
     ) -> Result<UnitRecord, UnitError>
     where
         E: Env,
@@ -237,20 +248,33 @@ impl RunUnit<'_> {
             n_terms: variant.terms.len(),
             frame_skip: variant.frame_skip,
             clip_reward: variant.clip_reward,
+            exploring_starts: variant.agent.is_on("exploring_starts").then_some(seed),
         };
+        let Extra { sweeps, exact } = extra;
+        let spacing = exact.as_ref().map_or(0, |exact| exact.spacing(limits.episodes));
         let mut rng = NumpyRng::from_u64(seed);
         let mut rows: Vec<EpisodeRow> = Vec::with_capacity(limits.episodes as usize);
-        train(&mut world, &mut agent, limits, &mut rng, stop, |row, _| {
+        train(&mut world, &mut agent, limits, &mut rng, stop, |mut row, agent| {
             each(row.steps);
+            if let (Some(exact), Some(v)) = (&exact, agent.v()) {
+                let episode = rows.len() as u32;
+                let due = episode % spacing == 0 || episode + 1 == limits.episodes;
+                row.value_error = due.then(|| exact.error(v));
+            }
             rows.push(row);
         })
         .map_err(|e| UnitError::train(variant, seed, e))?;
-        Ok(UnitRecord { rows, q: agent.q().cloned(), sweeps })
+        let q = agent.q().cloned();
+        let values = agent.v().filter(|_| q.is_none()).map(|v| StateValues {
+            v: v.to_vec(),
+            exact: exact.map_or_else(Vec::new, |exact| exact.v),
+        });
+        Ok(UnitRecord { rows, q, values, sweeps })
     }
 }
 
 struct Train<'a, E, D, P, R> {
-    unit: (RunUnit<'a>, Vec<f64>),
+    unit: (RunUnit<'a>, Extra),
     world: World<E, D, P, R>,
 }
 
@@ -264,7 +288,7 @@ where
     type Out = Result<UnitRecord, UnitError>;
 
     fn visit<A: Learn<usize>>(self, agent: A) -> Self::Out {
-        let (unit, sweeps) = self.unit;
-        unit.train(self.world, agent, sweeps)
+        let (unit, extra) = self.unit;
+        unit.train(self.world, agent, extra)
     }
 }

@@ -2,27 +2,33 @@
 //!
 //! Rounding must not decide a tie: potential-based shaping leaves two equally good actions equal
 //! in theory and apart in the last bit in practice, and from there on two learners that are the
-//! same by theorem play different episodes. Values within `1e-9 · max(1, |largest|)` of the
-//! largest count as tied, and the first of the tied is taken.
+//! same by theorem play different episodes. Values within 1e-9 of the largest count as tied, or
+//! within `1e-12 |largest|` if that is more, and the first of the tied is taken.
+//!
+//! Adding a potential to all values of a state must not change what is tied either. Hence the
+//! fixed width up to values of 1000, and above them one that is still hundreds of times what
+//! rounding can add up to: two good actions converge to the same value through every distance,
+//! and a width in proportion to the values would tie them sooner for one learner than for another.
 
 use super::q_table::max;
 use super::{QTable, Seen};
 use crate::mdp::Action;
 
-/// Relative width of a tie.
+/// Width of a tie between values that are not large.
 const TIE: f64 = 1e-9;
+/// Width of a tie between large values, per unit.
+const LARGE_TIE: f64 = 1e-12;
 
-/// The smallest value of a row that counts as tied with its largest.
+/// The smallest value that counts as tied with the largest, `best`.
 #[inline]
-fn threshold(row: &[f64]) -> f64 {
-    let best = max(row);
-    best - TIE * best.abs().max(1.0)
+fn threshold(best: f64) -> f64 {
+    best - (LARGE_TIE * best.abs()).max(TIE)
 }
 
 /// The first action whose value is within the tie tolerance of the largest.
 #[inline]
 pub fn argmax_tol(row: &[f64]) -> Action {
-    let threshold = threshold(row);
+    let threshold = threshold(max(row));
     row.iter().position(|&q| q >= threshold).unwrap_or(0)
 }
 
@@ -30,8 +36,7 @@ pub fn argmax_tol(row: &[f64]) -> Action {
 /// allows.
 #[inline]
 pub(super) fn is_greedy<S: Seen>(row: &[f64], s: S, action: Action) -> bool {
-    let best = max_allowed(row, s);
-    row[action] >= best - TIE * best.abs().max(1.0)
+    row[action] >= threshold(max_allowed(row, s))
 }
 
 /// The largest value among the actions that `s` allows.
@@ -63,8 +68,7 @@ pub fn argmax_allowed<S: Seen>(row: &[f64], s: S) -> Action {
     if !S::SHIELDED {
         return argmax_tol(row);
     }
-    let best = max_allowed(row, s);
-    let threshold = best - TIE * best.abs().max(1.0);
+    let threshold = threshold(max_allowed(row, s));
     (0..row.len()).find(|&a| s.allows(a) && row[a] >= threshold).unwrap_or(0)
 }
 
@@ -102,7 +106,8 @@ mod tests {
         assert_eq!(argmax_tol(&[0.0, 0.0, 0.0]), 0);
         assert_eq!(argmax_tol(&[0.3, 0.1 + 0.2, 0.0]), 0, "0.1 + 0.2 is above 0.3 by an ulp only");
         assert_eq!(argmax_tol(&[0.0, 1e-8]), 1);
-        assert_eq!(argmax_tol(&[1e6, 1e6 + 1e-4]), 0, "the tolerance grows with the values");
+        assert_eq!(argmax_tol(&[1e6, 1e6 + 1e-7]), 0, "the tolerance grows with the values");
+        assert_eq!(argmax_tol(&[500.0, 500.0 + 2e-9]), 1, "but not with small ones");
         assert_eq!(argmax_tol(&[-2.0, -1.0, -1.5]), 1);
     }
 

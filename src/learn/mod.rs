@@ -2,6 +2,8 @@
 //!
 //! - [`Agent`], [`Learn`]: chooses actions and learns from rewards
 //! - [`control`]: agents that learn a table of action values step by step; [`RandomAgent`]
+//! - [`MonteCarlo`], [`OffPolicyMonteCarlo`]: from the returns of whole episodes
+//! - [`prediction`]: the state values of a policy that is given
 //! - [`planning`]: value iteration, policy iteration, exact policy evaluation on a [`FiniteMdp`]
 //! - [`registry`]: the one place where an agent is registered; [`AgentConfig`] is its configuration
 //! - [`Behaviour`], [`StepSize`], [`Schedule`], [`QTable`], [`argmax_tol`], [`greedy_set`]: what
@@ -17,10 +19,14 @@ mod agent;
 mod behaviour;
 mod bootstrapped;
 pub mod control;
+mod episode;
 mod greedy;
 mod look_back;
+mod monte_carlo;
+mod off_policy_monte_carlo;
 mod params;
 pub mod planning;
+pub mod prediction;
 mod q_table;
 mod random_agent;
 pub mod registry;
@@ -33,8 +39,11 @@ pub use agent::{Agent, Last, Learn, Seen};
 pub use behaviour::{Behaviour, EpsilonGreedy, Exploration, Explore};
 pub use bootstrapped::{Bootstrapped, stability_bound};
 pub use control::{QLearning, Sarsa, td_error};
+pub use episode::Visits;
 pub use greedy::{argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed};
 pub use look_back::LookBack;
+pub use monte_carlo::MonteCarlo;
+pub use off_policy_monte_carlo::OffPolicyMonteCarlo;
 pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
 pub use q_table::QTable;
 pub use random_agent::RandomAgent;

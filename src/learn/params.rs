@@ -17,6 +17,8 @@ pub enum ParamValue {
     Float(f64),
     /// A schedule.
     Schedule(Schedule),
+    /// True or false.
+    Bool(bool),
     /// A step size by the number of visits.
     VisitCount {
         /// `N^−omega`.
@@ -35,6 +37,7 @@ impl std::fmt::Display for ParamValue {
         match self {
             Self::Int(n) => write!(f, "{n}"),
             Self::Float(x) => write!(f, "{x:?}"),
+            Self::Bool(yes) => write!(f, "{yes}"),
             Self::Word(word) => write!(f, "{word:?}"),
             Self::Function => write!(f, "a function"),
             Self::VisitCount { omega: 1.0 } => write!(f, "visit_count()"),
@@ -81,6 +84,8 @@ pub enum ParamKind {
         /// Whether 0 is excluded.
         open: bool,
     },
+    /// True or false.
+    Bool,
     /// A step size: a rate above 0, or one that goes by visits.
     StepSize,
     /// A behaviour policy.
@@ -93,6 +98,7 @@ impl ParamKind {
     /// What is allowed, in words.
     pub fn allowed(&self) -> String {
         match *self {
+            Self::Bool => "true or false".into(),
             Self::Word(words) => {
                 let quoted: Vec<String> = words.iter().map(|w| format!("{w:?}")).collect();
                 quoted.join(" or ")
@@ -135,7 +141,8 @@ impl ParamKind {
             (Self::StepSize, ParamValue::VisitCount { .. })
             | (Self::Exploration, ParamValue::Exploration(_)) => Some(value),
             (Self::StepSize, _) => Self::Rate { open: true }.accept(value),
-            (Self::Word(_) | Self::Int { .. } | Self::Exploration, _) => None,
+            (Self::Bool, ParamValue::Bool(_)) => Some(value),
+            (Self::Bool | Self::Word(_) | Self::Int { .. } | Self::Exploration, _) => None,
             (Self::Rate { open }, _) => {
                 let schedule = match value {
                     ParamValue::Schedule(schedule) => schedule,
@@ -263,6 +270,16 @@ impl AgentConfig {
             ParamValue::Word(word) => word,
             _ => unreachable!("{name} is a word"),
         }
+    }
+
+    /// Whether it has a switch of this name, and the switch is on.
+    pub fn is_on(&self, name: &str) -> bool {
+        self.params.get(name) == Some(&ParamValue::Bool(true))
+    }
+
+    /// Whether it learns the state values of a policy that is given.
+    pub fn is_predictor(&self) -> bool {
+        matches!(self.spec.build, Build::Predictor(_))
     }
 
     /// Whether it plans on a model instead of learning from steps.

@@ -19,6 +19,13 @@ pub fn closing_table(plan: &Plan, findings: &Findings) -> StudyTable {
         _ => "native return, rolling mean over each variant's own window".to_string(),
     };
     let mut notes = vec![format!("final: {over} of training, exploration included")];
+    if findings.summaries.iter().any(|s| s.value_error.is_some()) {
+        notes.push(
+            "value error: of V after the last episode, root mean square over the states that the \
+             policy reaches; IQM over seeds"
+                .into(),
+        );
+    }
     // Nobody can act on a verdict that says only that there is none.
     let undecided = plan.variants.iter().zip(&findings.audits);
     let undecided = undecided.filter(|(_, audit)| audit.policy_preserved.is_none());

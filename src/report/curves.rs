@@ -36,11 +36,18 @@ const PANEL_HEIGHT: f64 = 380.0;
 /// How many points all curves together may have, which keeps a file below 300 kB.
 const ALL_POINTS: usize = 5000;
 
+/// What curves show: the native return.
+pub const NATIVE_RETURN: &str = "native return";
+/// What curves show: the error of a predictor's values.
+pub const VALUE_ERROR: &str = "value error (RMS)";
+
 /// What is drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurvesPlot {
     /// The study's name.
     pub title: String,
+    /// What is drawn over episodes: the title of the value axis.
+    pub quantity: &'static str,
     /// The window of the rolling means, in episodes: named in the subtitle. `None` if the curves
     /// have windows of their own.
     pub window: Option<usize>,
@@ -55,7 +62,7 @@ pub struct CurvesPlot {
 pub struct Curve {
     /// The variant's name.
     pub name: String,
-    /// Its native return over episodes, as [`curve_band`](crate::stats::curve_band) makes it.
+    /// What it reached over episodes, as [`curve_band`](crate::stats::curve_band) makes it.
     pub band: CurveBand,
 }
 
@@ -93,7 +100,7 @@ pub fn curves_svg(plot: &CurvesPlot) -> String {
     if let Some(remark) = remark {
         text(&mut svg, left, 63.0, "fill=\"#555\"", &remark);
     }
-    axes(&mut svg, x, y);
+    axes(&mut svg, plot.quantity, x, y);
     // A nested frame clips the data to the panel without needing an id.
     let _ = writeln!(
         svg,
@@ -139,7 +146,9 @@ fn subtitle(plot: &CurvesPlot) -> String {
 
 /// The plot in words, for those who cannot see it.
 fn description(plot: &CurvesPlot, subtitle: &str) -> String {
-    let mut words = format!("Native return over episodes; {subtitle}.");
+    let quantity = plot.quantity;
+    let mut words =
+        format!("{}{} over episodes; {subtitle}.", quantity[..1].to_uppercase(), &quantity[1..]);
     for Curve { name, band } in &plot.curves {
         if let (Some(episode), Some(&end)) = (band.episode.last(), band.iqm.last()) {
             let _ = write!(words, " {name}: {} after {episode} episodes.", number(end));
@@ -203,7 +212,7 @@ fn lines_range(plot: &CurvesPlot, after: usize) -> (f64, f64) {
 }
 
 /// Grid lines, ticks and axis titles.
-fn axes(svg: &mut String, x: Scale, y: Scale) {
+fn axes(svg: &mut String, quantity: &str, x: Scale, y: Scale) {
     let (left, right, bottom, top) = (x.from, x.to, y.from, y.to);
     let mut grid = String::new();
     for (value, label) in y.ticks(7, 0.0) {
@@ -225,7 +234,7 @@ fn axes(svg: &mut String, x: Scale, y: Scale) {
     let style = "font-size=\"13\" text-anchor=\"middle\"";
     text(svg, middle, bottom + 42.0, style, "episode");
     let at = format!("{style} transform=\"rotate(-90 16 {})\"", f64::midpoint(top, bottom));
-    text(svg, 16.0, f64::midpoint(top, bottom), &at, "native return");
+    text(svg, 16.0, f64::midpoint(top, bottom), &at, quantity);
 }
 
 /// What lies inside the axes: bands under thin lines under thick ones, the threshold on top.

@@ -8,7 +8,8 @@ fn plot(threshold: Option<f64>, curves: &[(&str, Vec<Vec<f64>>)]) -> CurvesPlot 
         .iter()
         .map(|(name, runs)| Curve { name: (*name).into(), band: curve_band(runs, 20) })
         .collect();
-    CurvesPlot { title: "a <study> & more".into(), window: Some(20), threshold, curves }
+    let (title, quantity) = ("a <study> & more".into(), NATIVE_RETURN);
+    CurvesPlot { title, quantity, window: Some(20), threshold, curves }
 }
 
 /// Seeds that learn a little earlier or later, from −200 towards −100.

@@ -12,10 +12,10 @@
 //! - [`heat_map`], [`value_map`]: pictures in the terminal; [`picture_svg`]: as SVG
 //! - `colours`: a perceptually uniform scale, and colours for actions
 //! - `legend`: the legend of the curves
+//! - `runs`: a variant's units, gathered for tables and plots
 //! - `svg`: scales, ticks and escaping for hand-written SVG
 
-pub mod audit_json;
-pub mod audit_text;
+pub mod audit;
 pub mod claims;
 pub mod closing;
 mod colours;
@@ -28,6 +28,8 @@ pub mod manifest;
 pub mod picture;
 pub mod picture_svg;
 pub mod results;
+mod runs;
+pub mod score;
 pub mod stored;
 pub mod summary;
 mod svg;

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::frame::{Axis, Frame, Request, frames};
 use super::stored::StoredError;
-use crate::experiment::{Landscape, Learned};
+use crate::experiment::{Landscape, Learned, Values};
 use crate::learn::{argmax_tol, greedy_set};
 use crate::mdp::{Action, Grid};
 use crate::script::{Host, Variant};
@@ -18,7 +18,7 @@ use crate::script::{Host, Variant};
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// `max Q`, with Φ added back where the learner was shaped.
+    /// `max Q`, or a given policy's V, with Φ added back where the learner was shaped.
     Value,
     /// The greedy action.
     Policy,
@@ -115,16 +115,16 @@ impl Tables {
     /// The mean over the seeds that know a cell of their largest value there.
     fn value(&self, cell: usize) -> Option<f64> {
         let own = self.learned.iter().filter(|l| l.experienced[cell]);
-        let (n, sum) = own.fold((0u32, 0.0), |(n, sum), l| (n + 1, sum + l.q.max(cell)));
+        let (n, sum) = own.fold((0u32, 0.0), |(n, sum), l| (n + 1, sum + l.values.of(cell)));
         (n > 0).then(|| sum / f64::from(n))
     }
 
     /// The action that most of the seeds that know a cell take there; the first of several.
     fn action(&self, cell: usize) -> Option<Action> {
-        let n_actions = self.learned.first()?.q.n_actions();
+        let n_actions = self.learned.first()?.values.q()?.n_actions();
         let mut votes = vec![0u32; n_actions];
         for l in self.learned.iter().filter(|l| l.experienced[cell]) {
-            votes[argmax_tol(l.q.row(cell))] += 1;
+            votes[argmax_tol(l.values.q()?.row(cell))] += 1;
         }
         let most = *votes.iter().max()?;
         if most == 0 { None } else { votes.iter().position(|&v| v == most) }
@@ -134,7 +134,9 @@ impl Tables {
     /// the one that most take.
     fn actions(&self, cell: usize) -> Vec<Action> {
         match self.learned.as_slice() {
-            [one] if one.experienced[cell] => greedy_set(one.q.row(cell), one.q.max(cell).abs()),
+            [Learned { values: Values::Q(q), experienced }] if experienced[cell] => {
+                greedy_set(q.row(cell), q.max(cell).abs())
+            }
             _ => self.action(cell).into_iter().collect(),
         }
     }
@@ -163,6 +165,10 @@ pub fn pictures(
         let cells = spots(&mut landscape, &frame)?;
         for &quantity in quantities {
             if quantity == Quantity::Potential && !has_potential {
+                continue;
+            }
+            // A predictor was given its policy.
+            if quantity == Quantity::Policy && variant.agent.is_predictor() {
                 continue;
             }
             // A map of values has the arrows in it.
@@ -229,11 +235,12 @@ fn has_potential(variant: &Variant) -> bool {
 
 fn label(variant: &Variant, quantity: Quantity) -> String {
     let of = if variant.changes_reward() { ", of the reward it learned from" } else { "" };
+    let v = if variant.agent.is_predictor() { "V of the given policy" } else { "V = max Q" };
     match quantity {
         Quantity::Value if has_potential(variant) => {
-            format!("V = max Q + Φ{of} (what was learned, the potential added back)")
+            format!("{v} + Φ{of} (what was learned, the potential added back)")
         }
-        Quantity::Value => format!("V = max Q{of}"),
+        Quantity::Value => format!("{v}{of}"),
         Quantity::Policy => "greedy action".into(),
         Quantity::Potential => "potential Φ".into(),
     }

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::curves::{Curve, CurvesPlot, curves_svg};
+use super::curves::{CurvesPlot, NATIVE_RETURN, VALUE_ERROR, curves_svg};
 use super::manifest::{file_name, manifest};
-use super::summary::{VariantSummary, summarise};
+use super::runs::Runs;
+use super::summary::VariantSummary;
 use crate::experiment::{
     Audit, Execution, Store, StoreError, Unit, units, write_atomically, write_atomically_with,
 };
 use crate::script::Plan;
-use crate::stats::curve_band;
 
 /// A study's folder.
 #[derive(Debug)]
@@ -108,16 +108,16 @@ impl Results {
         audits: Vec<Audit>,
     ) -> Result<Findings, StoreError> {
         let steps_per_second = self.timing(plan, execution)?;
-        let mut curves = Vec::new();
-        let mut summaries = Vec::new();
+        let mut all = Vec::new();
         let path = self.folder.join("episodes.csv");
         let mut failed = None;
         write_atomically_with(&path, |file| {
             let mut csv = csv::Writer::from_writer(file);
             let terms = term_names(plan);
-            csv.write_record(episode_header(&terms))?;
-            for (i, variant) in plan.variants.iter().enumerate() {
-                let (mut returns, mut lengths) = (Vec::new(), Vec::new());
+            let predicts = plan.variants.iter().any(|v| v.agent.is_predictor());
+            csv.write_record(episode_header(&terms, predicts))?;
+            for i in 0..plan.variants.len() {
+                let mut runs = Runs::default();
                 for unit in execution.units.iter().filter(|u| u.variant == i) {
                     let stored = match self.store.load(unit) {
                         Ok(stored) => stored,
@@ -127,29 +127,23 @@ impl Results {
                         }
                     };
                     for (episode, row) in stored.rows.iter().enumerate() {
-                        csv.write_record(episode_line(plan, unit, episode, row, &terms))?;
+                        let mut line = episode_line(plan, unit, episode, row, &terms);
+                        if predicts {
+                            line.push(row.value_error.map_or_else(String::new, float));
+                        }
+                        csv.write_record(line)?;
                     }
-                    returns.push(stored.rows.iter().map(|r| r.native).collect::<Vec<f64>>());
-                    lengths.push(stored.rows.iter().map(|r| r.steps).collect::<Vec<u32>>());
+                    runs.push(&stored);
                 }
-                let window = variant.window as usize;
-                let (name, threshold) = (&variant.name, variant.threshold);
-                summaries.push(summarise(name, &returns, &lengths, window, threshold));
-                curves.push(Curve { name: name.clone(), band: curve_band(&returns, window) });
+                all.push(runs);
             }
             csv.flush()
         })
         .map_err(|e| failed.take().unwrap_or(e))?;
+        let runs = || plan.variants.iter().zip(&all);
+        let summaries: Vec<VariantSummary> = runs().map(|(v, runs)| runs.summary(v)).collect();
         self.summary(plan, &summaries, &audits)?;
-        let first = &plan.variants[0];
-        let shared = plan.variants.iter().all(|v| v.threshold == first.threshold);
-        let same_window = plan.variants.iter().all(|v| v.window == first.window);
-        let plot = CurvesPlot {
-            title: plan.name.clone(),
-            window: same_window.then_some(first.window as usize),
-            threshold: first.threshold.filter(|_| shared),
-            curves,
-        };
+        let plot = plot(plan, &all);
         write_atomically(&self.folder.join("curves.svg"), curves_svg(&plot).as_bytes())?;
         Ok(Findings { summaries, audits, steps_per_second })
     }
@@ -172,9 +166,15 @@ impl Results {
         let path = self.folder.join("summary.csv");
         write_atomically_with(&path, |file| {
             let mut csv = csv::Writer::from_writer(file);
-            csv.write_record(SUMMARY_HEADER)?;
+            let predicts = summaries.iter().any(|s| s.value_error.is_some());
+            let more = if predicts { &VALUE_ERROR_HEADER[..] } else { &[] };
+            csv.write_record(SUMMARY_HEADER.iter().chain(more))?;
             for (s, a) in summaries.iter().zip(audits) {
-                csv.write_record(summary_line(s, a))?;
+                let mut line = summary_line(s, a);
+                if predicts {
+                    line.extend(value_error_cells(s));
+                }
+                csv.write_record(line)?;
             }
             csv.flush()
         })
@@ -190,6 +190,32 @@ impl Results {
         let text = serde_json::to_string_pretty(&times).expect("plain data");
         write_atomically(&path, format!("{text}\n").as_bytes())?;
         Ok((0..plan.variants.len()).map(|i| rate(&times, &execution.units, i)).collect())
+    }
+}
+
+/// The learning curves of `plan`: returns, or where every variant predicts, the errors of its values.
+fn plot(plan: &Plan, all: &[Runs]) -> CurvesPlot {
+    let runs = || plan.variants.iter().zip(all);
+    let title = plan.name.clone();
+    if all.iter().all(Runs::has_errors) {
+        let curves = runs().map(|(v, runs)| runs.error_curve(v)).collect();
+        return CurvesPlot {
+            title,
+            quantity: VALUE_ERROR,
+            window: Some(1),
+            threshold: None,
+            curves,
+        };
+    }
+    let first = &plan.variants[0];
+    let shared = plan.variants.iter().all(|v| v.threshold == first.threshold);
+    let same_window = plan.variants.iter().all(|v| v.window == first.window);
+    CurvesPlot {
+        title,
+        quantity: NATIVE_RETURN,
+        window: same_window.then_some(first.window as usize),
+        threshold: first.threshold.filter(|_| shared),
+        curves: runs().map(|(v, runs)| runs.curve(v)).collect(),
     }
 }
 
@@ -280,11 +306,17 @@ fn term_names(plan: &Plan) -> Vec<&str> {
     names
 }
 
-fn episode_header<'a>(terms: &[&'a str]) -> Vec<&'a str> {
+/// A float as the shortest text that reads back as the same float.
+fn float(x: f64) -> String {
+    format!("{x:?}")
+}
+
+fn episode_header<'a>(terms: &[&'a str], predicts: bool) -> Vec<&'a str> {
     let mut header =
         vec!["variant", "seed", "episode", "steps", "return", "learned_return", "shaping"];
     header.extend(terms);
     header.extend(["epsilon", "ending"]);
+    header.extend(predicts.then_some("value_error"));
     header
 }
 
@@ -297,7 +329,6 @@ fn episode_line(
     terms: &[&str],
 ) -> Vec<String> {
     let variant = &plan.variants[unit.variant];
-    let float = |x: f64| format!("{x:?}");
     let mut line = vec![
         variant.name.clone(),
         unit.seed.to_string(),
@@ -334,9 +365,17 @@ const SUMMARY_HEADER: [&str; 16] = [
     "audit",
 ];
 
+const VALUE_ERROR_HEADER: [&str; 4] =
+    ["value_error_mean", "value_error_iqm", "value_error_low", "value_error_high"];
+
+fn value_error_cells(s: &VariantSummary) -> [String; 4] {
+    let Some(error) = &s.value_error else { return Default::default() };
+    let maybe = |x: Option<f64>| x.map_or_else(String::new, float);
+    [float(error.mean), float(error.iqm), maybe(error.low), maybe(error.high)]
+}
+
 fn summary_line(s: &VariantSummary, audit: &Audit) -> Vec<String> {
-    let float = |x: f64| format!("{x:?}");
-    let maybe = |x: Option<f64>| x.map_or(String::new(), float);
+    let maybe = |x: Option<f64>| x.map_or_else(String::new, float);
     vec![
         s.name.clone(),
         s.seeds.to_string(),

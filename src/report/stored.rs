@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::results::{Findings, rate, read_times};
-use super::summary::summarise;
+use super::runs::Runs;
 use crate::experiment::{
     Learned, SEMANTICS, Store, StoreError, StoredUnit, Unit, audit_variant, units,
 };
@@ -220,15 +220,11 @@ impl Stored {
             if own.is_empty() {
                 continue;
             }
-            let (mut returns, mut lengths) = (Vec::new(), Vec::new());
+            let mut runs = Runs::default();
             for unit in &own {
-                let rows = self.load(unit)?.rows;
-                returns.push(rows.iter().map(|r| r.native).collect::<Vec<f64>>());
-                lengths.push(rows.iter().map(|r| r.steps).collect::<Vec<u32>>());
+                runs.push(&self.load(unit)?);
             }
-            let window = variant.window as usize;
-            let summary = summarise(&variant.name, &returns, &lengths, window, variant.threshold);
-            findings.summaries.push(summary);
+            findings.summaries.push(runs.summary(variant));
             findings.audits.push(audit_variant(host, variant, None)?);
             findings.steps_per_second.push(rate(&times, present, i));
             let seeds = SeedList(own.iter().map(|u| u.seed).collect());

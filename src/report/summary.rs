@@ -35,6 +35,11 @@ impl OverSeeds {
         }
     }
 
+    /// The limits of the interval of the IQM, if there is one.
+    pub fn limits(&self) -> Option<(f64, f64)> {
+        self.low.zip(self.high)
+    }
+
     /// The interval of the IQM, if there is one.
     pub fn interval(&self) -> Option<Interval> {
         Some(Interval { low: self.low?, high: self.high?, method: self.method? })
@@ -71,6 +76,16 @@ pub struct VariantSummary {
     pub auc: OverSeeds,
     /// When the threshold was reached; `None` without a threshold.
     pub solved: Option<Solved>,
+    /// The error of a predictor's values after the last episode: root mean square over the states
+    /// that its policy reaches. `None` for other agents, and where the exact values are not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value_error: Option<OverSeeds>,
+    /// The largest error among those states.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value_error_max: Option<OverSeeds>,
+    /// The mean of the errors after each episode.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value_error_auc: Option<OverSeeds>,
     /// Mean steps per episode, over all episodes of all seeds.
     pub mean_steps: f64,
     /// The values behind `final_return`, `[seeds]`.
@@ -115,6 +130,9 @@ pub fn summarise(
         final_return: OverSeeds::of(&final_returns),
         auc: OverSeeds::of(&areas),
         solved: threshold.map(|threshold| solved(returns, window, threshold)),
+        value_error: None,
+        value_error_max: None,
+        value_error_auc: None,
         mean_steps: steps as f64 / episodes_in_all as f64,
         final_returns,
         warnings,

@@ -12,6 +12,19 @@ pub const WIDTH: usize = 100;
 /// Names and verdicts are shortened to make room, but not below this.
 const SHORTEST: usize = 12;
 
+/// The columns; of text the first and the last, else of numbers.
+const HEADINGS: [&str; COLUMNS] = [
+    "variant",
+    "final mean",
+    "final IQM [95 %]",
+    "solved after",
+    "value error [95 %]",
+    "steps/s",
+    "audit",
+];
+const COLUMNS: usize = 7;
+const LAST: usize = COLUMNS - 1;
+
 /// What the table shows.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StudyTable {
@@ -37,6 +50,9 @@ pub struct TableRow {
     /// How many seeds solved the task, and the median number of episodes it took them; `None`
     /// without a threshold.
     pub solved: Option<(usize, Option<f64>)>,
+    /// The error of a predictor's values after the last episode: the interquartile mean over seeds,
+    /// and its 95 % interval.
+    pub value_error: Option<(f64, Option<(f64, f64)>)>,
     /// Steps per second while training; `None` if nothing was run (all results were there).
     pub steps_per_second: Option<f64>,
     /// The audit's verdict in a few words; empty if there was nothing to audit.
@@ -51,8 +67,9 @@ impl TableRow {
             seeds: summary.seeds,
             mean: summary.final_return.mean,
             iqm: summary.final_return.iqm,
-            interval: summary.final_return.interval().map(|i| (i.low, i.high)),
+            interval: summary.final_return.limits(),
             solved: summary.solved.as_ref().map(|s| (s.seeds, s.median_episode)),
+            value_error: summary.value_error.as_ref().map(|e| (e.iqm, e.limits())),
             steps_per_second,
             verdict,
         }
@@ -63,19 +80,16 @@ impl StudyTable {
     /// The table and its notes, each line ended by a newline. Columns without content are left out.
     pub fn render(&self) -> String {
         let decimals = self.decimals();
-        let mut cells = vec![
-            ["variant", "final mean", "final IQM [95 %]", "solved after", "steps/s", "audit"]
-                .map(str::to_owned),
-        ];
-        cells.extend(self.rows.iter().map(|row| row.cells(decimals)));
-        let mut widths: [usize; 6] = [0; 6];
+        let mut cells = vec![HEADINGS.map(str::to_owned)];
+        cells.extend(self.rows.iter().map(|row| row.cells(decimals, self.error_decimals())));
+        let mut widths = [0; COLUMNS];
         for row in &cells {
             for (w, cell) in widths.iter_mut().zip(row) {
                 *w = (*w).max(width(cell));
             }
         }
         // A column of empty cells has no heading to show either.
-        for column in 1..6 {
+        for column in 1..COLUMNS {
             if cells[1..].iter().all(|row| row[column].is_empty()) {
                 widths[column] = 0;
             }
@@ -84,8 +98,8 @@ impl StudyTable {
         let total: usize = widths.iter().sum::<usize>() + 2 * columns.saturating_sub(1);
         let mut excess = total.saturating_sub(WIDTH);
         // Names and verdicts give way, the longer one first: nobody wants to lose a number.
-        while excess > 0 && widths[0].max(widths[5]) > SHORTEST {
-            let longer = if widths[5] > widths[0] { 5 } else { 0 };
+        while excess > 0 && widths[0].max(widths[LAST]) > SHORTEST {
+            let longer = if widths[LAST] > widths[0] { LAST } else { 0 };
             widths[longer] -= 1;
             excess -= 1;
         }
@@ -116,6 +130,18 @@ impl StudyTable {
         }
     }
 
+    /// Three significant digits of the largest error.
+    fn error_decimals(&self) -> usize {
+        let errors = self.rows.iter().filter_map(|r| r.value_error).map(|(error, _)| error);
+        let mut largest = errors.filter(|e| e.is_finite()).fold(0.0, f64::max);
+        let mut decimals = 0;
+        while largest > 0.0 && largest < 100.0 && decimals < 12 {
+            largest *= 10.0;
+            decimals += 1;
+        }
+        decimals
+    }
+
     /// What the rows call for, then what was passed in.
     fn all_notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -128,23 +154,37 @@ impl StudyTable {
 }
 
 impl TableRow {
-    fn cells(&self, decimals: usize) -> [String; 6] {
-        let number = |v: f64| {
-            if v.is_nan() { "–".to_owned() } else { format!("{v:.decimals$}") }
-        };
-        let iqm = match self.interval {
-            Some((low, high)) => {
-                format!("{} [{}, {}]", number(self.iqm), number(low), number(high))
-            }
-            None => number(self.iqm),
-        };
+    fn cells(&self, decimals: usize, error_decimals: usize) -> [String; COLUMNS] {
+        let value_error = self.value_error;
+        let value_error = value_error.map(|(iqm, limits)| bounded(iqm, limits, error_decimals));
         let solved = match self.solved {
             None => String::new(),
             Some((solved, Some(median))) => format!("{median:.0} ({solved}/{})", self.seeds),
             Some((solved, None)) => format!("never ({solved}/{})", self.seeds),
         };
         let speed = self.steps_per_second.map_or_else(String::new, si);
-        [self.name.clone(), number(self.mean), iqm, solved, speed, self.verdict.clone()]
+        [
+            self.name.clone(),
+            fixed(self.mean, decimals),
+            bounded(self.iqm, self.interval, decimals),
+            solved,
+            value_error.unwrap_or_default(),
+            speed,
+            self.verdict.clone(),
+        ]
+    }
+}
+
+fn fixed(v: f64, decimals: usize) -> String {
+    if v.is_nan() { "–".to_owned() } else { format!("{v:.decimals$}") }
+}
+
+/// A number with the limits of its interval.
+fn bounded(v: f64, limits: Option<(f64, f64)>, decimals: usize) -> String {
+    let v = fixed(v, decimals);
+    match limits {
+        Some((low, high)) => format!("{v} [{}, {}]", fixed(low, decimals), fixed(high, decimals)),
+        None => v,
     }
 }
 
@@ -166,7 +206,7 @@ fn si(value: f64) -> String {
 }
 
 /// One row: text to the left, numbers to the right, two spaces between.
-fn line(cells: &[String; 6], widths: &[usize; 6]) -> String {
+fn line(cells: &[String; COLUMNS], widths: &[usize; COLUMNS]) -> String {
     let mut out = String::new();
     for (column, (cell, &w)) in cells.iter().zip(widths).enumerate() {
         if w == 0 {
@@ -177,7 +217,7 @@ fn line(cells: &[String; 6], widths: &[usize; 6]) -> String {
         }
         let cell = shorten(cell, w);
         let space = " ".repeat(w - width(&cell));
-        if matches!(column, 0 | 5) {
+        if matches!(column, 0 | LAST) {
             out.push_str(&cell);
             out.push_str(&space);
         } else {
@@ -276,6 +316,7 @@ mod tests {
             solved: Some(solved),
             steps_per_second: Some(12_345_678.0),
             verdict: "preserves the policy".into(),
+            value_error: None,
         }
     }
 
@@ -342,6 +383,24 @@ mod tests {
         b                 –                     –
         note: with 5 seeds a 95 % interval is only a rough guide: where a few runs go much better or worse
               than the rest, it misses the truth far more often than 5 % of the time; use 20
+        ");
+    }
+
+    #[test]
+    fn errors_of_values_have_three_digits() {
+        let mut rows = vec![
+            row("td0", 0.5, (0.4, 0.6), (0, None)),
+            row("monte carlo", 0.5, (0.4, 0.6), (0, None)),
+        ];
+        for r in &mut rows {
+            (r.solved, r.steps_per_second, r.verdict) = (None, None, String::new());
+        }
+        rows[0].value_error = Some((0.034_56, Some((0.03, 0.041))));
+        insta::assert_snapshot!(StudyTable { rows, notes: vec![] }.render(), @r"
+        variant      final mean      final IQM [95 %]       value error [95 %]
+        ──────────────────────────────────────────────────────────────────────
+        td0              -0.750  0.500 [0.400, 0.600]  0.0346 [0.0300, 0.0410]
+        monte carlo      -0.750  0.500 [0.400, 0.600]
         ");
     }
 

@@ -12,7 +12,7 @@ use super::params::show;
 use super::plan::Callback;
 use super::record;
 use super::state::{State, StepView};
-use crate::mdp::{Env, Schema};
+use crate::mdp::{Action, Env, Schema};
 use crate::shaping::{
     ActionFn, ActionSet, CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn, Scale, ShieldFn,
 };
@@ -159,6 +159,34 @@ impl Callbacks {
             };
             number.map_err(fault)
         })
+    }
+
+    /// `callback` as a policy over `n_actions` actions: the number of one of them.
+    pub fn policy(
+        self: &Rc<Self>,
+        callback: &Callback,
+        n_actions: usize,
+        schema: &Schema,
+    ) -> impl FnMut(&[f64]) -> Result<Action, Fault> + use<> {
+        let (host, callback, schema) =
+            (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
+        move |fields| {
+            let state = State::new(&schema, fields);
+            let on = || format!("on the state {}", state.describe());
+            let given = [Dynamic::from(state.clone())];
+            let value = host.call(&callback, given).map_err(|d| fault(d.note(on())))?;
+            let action = value.as_int().ok().and_then(|a| usize::try_from(a).ok());
+            action.filter(|&a| a < n_actions).ok_or_else(|| {
+                let d = Diagnostic::error(format!(
+                    "the policy {} must return the number of an action, 0 to {}, it returned {}",
+                    callback.callback.described(),
+                    n_actions - 1,
+                    show(&value)
+                ));
+                let d = d.maybe_hint(value.is_float().then(|| "write floor(x).to_int()".into()));
+                fault(host.annotate(d.at(callback.callback.place.clone()).note(on())))
+            })
+        }
     }
 
     /// `callback` as a shield over `n_actions` actions.

@@ -283,7 +283,8 @@ impl ExperimentDraft {
 }
 
 /// Columns of `episodes.csv` that no term may take.
-const TAKEN_COLUMNS: [&str; 9] = [
+const TAKEN_COLUMNS: [&str; 10] = [
+    "value_error",
     "variant",
     "seed",
     "episode",

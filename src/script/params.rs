@@ -155,6 +155,9 @@ fn raw(value: &Dynamic, kind: ParamKind) -> ParamValue {
     if let Ok(x) = flat.as_float() {
         return ParamValue::Float(x);
     }
+    if let Ok(yes) = flat.as_bool() {
+        return ParamValue::Bool(yes);
+    }
     if let (Some(word), ParamKind::Word(words)) = (text(&flat), kind) {
         let known = words.iter().find(|known| **known == word);
         return known.map_or(ParamValue::Float(f64::NAN), |word| ParamValue::Word(word));

@@ -14,7 +14,7 @@ use super::plan::{Callback, DiscretiserSpec, Expectation, Plan, SeedList, Varian
 use super::value::Value;
 use super::world::{clipping_warning, dims, example_bins, physical_bins};
 use crate::env::{AnyEnv, EnvSpec};
-use crate::learn::{AgentConfig, Signature};
+use crate::learn::{AgentConfig, ParamValue, Signature};
 use crate::shaping::{ActionSet, Dim, Scale};
 
 const EPISODES: u32 = 500;
@@ -121,6 +121,7 @@ impl Resolver<'_> {
         }
         let shaped = self.shaping(&draft.shaping, &agent.value, &discretiser, warnings)?;
         let allowed = self.allowed(draft, &any, spec)?;
+        use_of_model(draft, &agent, spec, &any, &discretiser)?;
         let mut agent_functions = BTreeMap::new();
         if let Some(drafted) = &draft.agent {
             for (name, f) in &drafted.value.functions {
@@ -258,4 +259,54 @@ impl Resolver<'_> {
             },
         }
     }
+}
+
+/// Refuses parameters of learners that need a finite model where there is none to use.
+fn use_of_model(
+    draft: &ExperimentDraft,
+    agent: &Located<AgentConfig>,
+    spec: &EnvSpec,
+    env: &AnyEnv,
+    discretiser: &DiscretiserSpec,
+) -> Result<(), Diagnostic> {
+    let (name, id) = (agent.value.spec.name, spec.id);
+    let refuse = |message: String, hint: &str| {
+        Err(Diagnostic::error(message).at(agent.spot.place()).hint(hint))
+    };
+    let has_model = env.finite().is_some();
+    if agent.value.is_on("exploring_starts") && !has_model {
+        return refuse(
+            format!(
+                "`exploring_starts` draws start states from the finite model of {id}: it has none"
+            ),
+            "leave it out: epsilon explores too",
+        );
+    }
+    if !agent.value.is_predictor() || agent.value.params["policy"] == ParamValue::Word("random") {
+        return Ok(());
+    }
+    if let Some(f) = &draft.allowed {
+        return Err(Diagnostic::error(format!("`{name}` plays the policy that it is given"))
+            .at(f.spot.place())
+            .hint("leave out `allowed`, or say `policy: \"random\"`"));
+    }
+    if agent.value.params["policy"] == ParamValue::Word("greedy") {
+        let why = match (has_model, discretiser) {
+            (false, _) => "it has none",
+            (true, DiscretiserSpec::StateIndex)
+                if draft.setting.frame_skip.is_none_or(|n| n == 1) =>
+            {
+                return Ok(());
+            }
+            (true, DiscretiserSpec::StateIndex) => "it speaks of single steps, not of `frame_skip`",
+            (true, _) => "it speaks of states, not of a discretiser's cells",
+        };
+        return refuse(
+            format!(
+                "`policy: \"greedy\"` of `{name}` is planned on the finite model of {id}: {why}"
+            ),
+            "give the policy as a function: `policy: |s| 0` always plays action 0",
+        );
+    }
+    Ok(())
 }

@@ -1,6 +1,7 @@
 //! Integration tests: one binary, one module a subject.
 
 mod blackjack;
+mod book_figures;
 mod cli;
 mod crash;
 mod env;
@@ -12,13 +13,17 @@ mod numbers;
 mod parity;
 mod placing;
 mod play;
+mod prediction;
 mod readme;
 mod refusals;
 mod render;
 mod scripts;
 mod setting;
 mod shaping;
+mod shaping_figures;
+mod shield;
 mod show;
+mod solved;
 mod support;
 mod theory;
 mod toy_text;

@@ -147,6 +147,22 @@ fn what_is_no_potential_is_found_and_the_certificate_holds() {
 }
 
 #[test]
+fn some_starts_are_where_episodes_come_to() {
+    // Less than fifty steps count, and nobody is at the goal so soon after a reset.
+    let goal = |t: &CarStep<'_>| if t.terminated { 250.0 } else { 0.0 };
+    let settings = PathwiseSettings { starts: 100, ..PathwiseSettings::new(0.5) };
+    assert!(settings.horizon() < 50);
+    let found = car(settings, goal).violation.unwrap();
+    assert!(found.step > 0);
+    assert_eq!(found.trajectories[1].ending, Ending::Terminated);
+    // Within a time limit no start is beyond it.
+    let limited = PathwiseSettings { time_limit: Some(60), ..settings };
+    if let Some(found) = car(limited, goal).violation {
+        assert!(found.step < 60, "{found:?}");
+    }
+}
+
+#[test]
 fn undiscounted_only_whole_episodes_count() {
     let settings = PathwiseSettings { gamma: 1.0, ..settings() };
     let good = car(settings, |t| proper(1.0, t));

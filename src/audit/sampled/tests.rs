@@ -200,6 +200,9 @@ fn a_potential_of_the_cell_is_one_and_a_potential_of_the_state_is_none() {
         }
         assert!((raw.phi[s] - phi).abs() < 0.6, "the mean of a cell is near its centre");
     }
+    // Every cell has draws of its own.
+    let off = |s: usize| raw.phi[s] - cell.phi[s];
+    assert!((off(30) - off(70)).abs() > 1e-6 && (off(30) - off(31)).abs() > 1e-6);
     let q = solve(&cell.mdp);
     assert_eq!(changed(&solve(&cell.shaped()), &q), 0);
     assert!(changed(&solve(&raw.shaped()), &q) > 20);

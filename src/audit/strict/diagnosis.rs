@@ -2,11 +2,10 @@
 
 use serde::Serialize;
 
-use super::forest::{Anchor, Forest};
-use super::recover::{Beyond, recover};
-use super::{Finding, check};
+use super::forest::{Anchor, leaving};
+use super::recover::{Beyond, Recovered, recover};
+use super::{Finding, Question};
 use crate::audit::certificate::{Certificate, Walk};
-use crate::mdp::FiniteMdp;
 
 /// Where discounts other than the learner's are looked for: up to 1.25, in steps of 1/256.
 const STEPS: i32 = 320;
@@ -25,7 +24,7 @@ pub struct TerminalPotential {
 /// terminal transition: what all transitions agree with.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
-    /// γ_F; the learner's if that is not the mistake.
+    /// `γ_F`; the learner's if that is not the mistake.
     pub gamma: f64,
     /// Φ of every terminal state, in order; empty if it is 0 in all of them.
     pub terminals: Vec<TerminalPotential>,
@@ -46,19 +45,15 @@ impl Diagnosis {
     }
 }
 
-/// Looks for a mistake that explains `f`: a terminal potential, then another discount, then both.
+/// Looks for a mistake that explains F: a terminal potential, then another discount, then both.
 pub(super) fn diagnose(
-    mdp: &FiniteMdp,
-    f: &[f64],
-    gamma: f64,
-    forest: &Forest,
+    question: &Question<'_>,
     certificate: Option<&Certificate>,
-    declared: Option<&[f64]>,
 ) -> Option<Diagnosis> {
+    let &Question { mdp, f, gamma, forest, declared, .. } = question;
     let explains = |gamma_f: f64, beyond: Beyond| {
         let recovered = recover(mdp, f, gamma_f, forest, beyond, declared);
-        let agrees = check(mdp, f, gamma_f, forest, &recovered).finding() == Finding::Holds;
-        (agrees && recovered.sound).then(|| {
+        (recovered.sound && question.agrees(gamma_f, &recovered)).then(|| {
             let mut terminals = Vec::new();
             for (anchor, &phi) in forest.anchors.iter().zip(&recovered.anchors) {
                 if let (Anchor::Terminal(state), Beyond::Unknown) = (anchor, beyond) {
@@ -79,6 +74,23 @@ pub(super) fn diagnose(
     explains(gamma, Beyond::Unknown)
         .or_else(|| discounts.into_iter().find_map(|g| explains(g, Beyond::Zero)))
         .or_else(|| usual.into_iter().find_map(|g| explains(g, Beyond::Unknown)))
+}
+
+impl Question<'_> {
+    /// Whether every transition agrees with a potential of this discount.
+    fn agrees(&self, gamma: f64, recovered: &Recovered) -> bool {
+        let scale = recovered.scale(self.magnitude);
+        let mut outcomes = self
+            .forest
+            .order
+            .iter()
+            .flat_map(|&s| leaving(self.mdp, s as usize).map(move |(i, o)| (s as usize, i, o)));
+        outcomes.all(|(s, i, o)| {
+            let next = recovered.beyond(self.forest, o.next_state, o.terminated);
+            let error = (gamma * next - recovered.phi[s] - self.f[i]).abs();
+            Finding::of(error, scale) == Finding::Holds
+        })
+    }
 }
 
 /// The discounts for which the two walks of a certificate have equal sums. Both must end.

@@ -31,6 +31,11 @@ pub(in crate::audit) struct Recovered {
 }
 
 impl Recovered {
+    /// S, the rewards being of this `magnitude`.
+    pub(in crate::audit) fn scale(&self, magnitude: f64) -> f64 {
+        self.phi.iter().chain(&self.anchors).fold(magnitude, |m, x| m.max(x.abs()))
+    }
+
     /// Φ where a transition leads.
     #[inline]
     pub(in crate::audit) fn beyond(&self, forest: &Forest, next: u32, terminated: bool) -> f64 {
@@ -259,10 +264,10 @@ impl Links {
             }
         }
         let mut free = 0;
-        for a in 0..self.to.len() {
+        for (a, x) in chosen.into_iter().enumerate() {
             if self.to[a] as usize == a && self.known[a].is_none() {
                 free += 1;
-                self.known[a] = Some(chosen[a].unwrap_or(0.0));
+                self.known[a] = Some(x.unwrap_or(0.0));
             }
         }
         free

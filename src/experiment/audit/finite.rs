@@ -7,8 +7,9 @@ use super::named::Naming;
 use super::replacement::replacement;
 use super::{Audit, AuditVerdict, beyond_states};
 use crate::audit::{
-    Advantages, Expected, Finding, Pathwise, PathwiseSettings, Pattern, Preservation, Scaling,
-    Strict, pathwise, pattern, preservation, strict,
+    Advantages, BrokenTask, Critical, Cycle, Expected, Finding, Hacking, NotSsp, Pair, Pathwise,
+    PathwiseSettings, Pattern, PolicyChange, Preservation, Scaling, SspCheck, Strict, Unsolved,
+    broken_task, pathwise, pattern, strict,
 };
 use crate::experiment::assemble::{NotAModelError, learned_model};
 use crate::experiment::shielded::playable;
@@ -51,6 +52,17 @@ pub struct Exact {
     pub pattern: Pattern,
     /// Both models solved and compared; `None` if they cannot be.
     pub preservation: Option<Preservation>,
+    /// What is lost in native return.
+    pub change: Option<PolicyChange>,
+    /// How far the added reward could be scaled before the optimal actions change; not asked of
+    /// potentials, for which there is no limit.
+    pub critical: Option<Critical>,
+    /// The loop that pays better than the task.
+    pub hacking: Option<Hacking>,
+    /// With γ = 1, a loop that pays for ever: there is no optimal policy for the learned reward.
+    pub endless: Option<Cycle>,
+    /// A task on the same dynamics that the added reward would break.
+    pub broken_task: Option<BrokenTask>,
     /// Episodes compared, where there is no model of the reward.
     pub pathwise: Option<Pathwise>,
     /// What states and actions are called.
@@ -66,16 +78,20 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     let mdp = env.finite().expect("only asked of finite environments");
     let mdp = &playable(host, variant, env, (**mdp).clone())?;
     let gamma = variant.agent.float("gamma");
-    let reachable = mdp.reachable();
     let mut exact = Exact {
         gamma,
-        states: reachable.iter().filter(|r| **r).count(),
+        states: 0,
         strict: None,
         expected: None,
         scaling: None,
         starc: None,
         pattern: Pattern::Other,
         preservation: None,
+        change: None,
+        critical: None,
+        hacking: None,
+        endless: None,
+        broken_task: None,
         pathwise: None,
         naming: Naming::new(env),
     };
@@ -89,6 +105,8 @@ pub(super) fn judge<E: Env + Clone + 'static>(
             };
         }
     };
+    let reachable = mdp.reachable();
+    exact.states = reachable.iter().filter(|r| **r).count();
     let added = model.shaped.outcomes().iter().zip(mdp.outcomes());
     let f: Vec<f64> = added.map(|(shaped, plain)| shaped.reward - plain.reward).collect();
     exact.pattern = pattern(mdp, &f, &reachable);
@@ -102,44 +120,57 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         exact.starc = Some(advantages.starc());
     }
     let potential_only = !variant.changes_reward();
-    let compared = preservation(mdp, &model.shaped, gamma, &model.phi);
-    let preserved = compared.as_ref().ok().and_then(|p| p.verdict.preserved());
-    let (verdict, basis) = match (checked.finding, preserved) {
-        (Finding::Holds, Some(true)) if potential_only => (
-            AuditVerdict::PotentialBased,
-            beyond_states(variant)
+    let pair = Pair::new(mdp, &f, gamma);
+    let compared = pair.as_ref().ok().map(|pair| pair.preservation(&model.phi));
+    let preserved = match (&compared, &pair) {
+        (Some(compared), _) => compared.verdict.preserved(),
+        // Whoever goes round for ever earns without limit: no policy of the task's is optimal.
+        (None, Err(Unsolved::Learned(SspCheck::NotSsp { why, .. }))) => match why {
+            NotSsp::PayingLoop { cycle, .. } => {
+                exact.endless.clone_from(cycle);
+                Some(false)
+            }
+            _ => None,
+        },
+        _ => None,
+    };
+    let verdict = match checked.finding {
+        Finding::Holds => AuditVerdict::PotentialBased,
+        Finding::Fails => AuditVerdict::NotPotentialBased,
+        Finding::Inconclusive => AuditVerdict::Inconclusive,
+    };
+    let basis = match (&pair, preserved) {
+        (Err(unsolved), _) => format!("{unsolved}"),
+        (Ok(_), None) => "two actions are too close for the numbers to decide".into(),
+        (Ok(_), Some(false)) => "exact: the greedy sets differ".into(),
+        (Ok(_), Some(true)) => match (verdict, potential_only) {
+            (AuditVerdict::PotentialBased, true) => beyond_states(variant)
                 .unwrap_or("exact: Q_F + Φ = Q and the greedy sets are equal")
                 .into(),
-        ),
-        (Finding::Holds, Some(true)) => (
-            AuditVerdict::PotentialBased,
-            "exact: every transition agrees with one potential".into(),
-        ),
-        (Finding::Fails, Some(true)) => {
-            (AuditVerdict::NotPotentialBased, "exact: the greedy sets are equal".into())
-        }
-        (Finding::Fails, Some(false)) => {
-            (AuditVerdict::NotPotentialBased, "exact: the greedy sets differ".into())
-        }
-        (finding, _) => {
-            let verdict = match finding {
-                Finding::Holds => AuditVerdict::PotentialBased,
-                Finding::Fails => AuditVerdict::NotPotentialBased,
-                Finding::Inconclusive => AuditVerdict::Inconclusive,
-            };
-            let why = match &compared {
-                Ok(_) => "two actions are too close for the numbers to decide".to_string(),
-                Err(e) => e.to_string(),
-            };
-            (verdict, why)
-        }
+            (AuditVerdict::PotentialBased, false) => {
+                "exact: every transition agrees with one potential".into()
+            }
+            _ => "exact: the greedy sets are equal".into(),
+        },
     };
     let mut audit = Audit::new(verdict, preserved, basis);
     if verdict == AuditVerdict::NotPotentialBased {
         audit.instead = Some(replacement(variant, exact.pattern, Some(&checked)));
+        exact.broken_task = broken_task(mdp, &dynamics, &f, gamma).ok().flatten();
     }
+    if let Ok(pair) = &pair {
+        exact.change = pair.policy_change().ok();
+        if verdict == AuditVerdict::NotPotentialBased {
+            exact.critical = pair.critical().ok();
+            exact.hacking = pair.hacking().ok().flatten();
+        }
+    }
+    audit.true_return =
+        exact.change.as_ref().map(|c| TrueReturn { optimal: c.optimal, shaped: c.worst });
+    audit.critical = exact.critical;
+    audit.exploitable = Some(exact.hacking.is_some() || exact.endless.is_some());
     exact.strict = Some(checked);
-    if let Ok(compared) = compared {
+    if let Some(compared) = compared {
         audit.states_changed = Some(compared.states_changed.len());
         audit.identity_holds = potential_only.then(|| compared.identity_holds());
         exact.preservation = Some(compared);

@@ -10,12 +10,13 @@ mod replacement;
 use serde::Serialize;
 
 use super::assemble::diagnostic_of;
-use crate::audit::{Pathwise, Preservation};
+use crate::audit::{Critical, Pathwise, Preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
 use crate::script::{AdviceOn, Diagnostic, DiscretiserSpec, Host, PhiOn, Plan, Variant};
 use crate::shaping::Fault;
 
+pub(super) use continuous::sample;
 pub use continuous::{Continuous, SampledModel};
 pub use finite::{Exact, TrueReturn};
 pub use named::Naming;
@@ -63,6 +64,11 @@ pub struct Audit {
     /// What the best policy earns, and what the policy that is best for the shaped reward earns, in
     /// the environment's own reward, where the model is known.
     pub true_return: Option<TrueReturn>,
+    /// How far the added reward could be scaled before the optimal actions change, where the model is
+    /// known and the reward is no potential's.
+    pub critical: Option<Critical>,
+    /// Whether there is a loop that pays better than the task, where the model is known.
+    pub exploitable: Option<bool>,
     /// On what the verdict rests, in one line.
     pub basis: String,
     /// What a potential could do in its place, if it is none.
@@ -87,6 +93,8 @@ impl Audit {
             states_changed: None,
             identity_holds: None,
             true_return: None,
+            critical: None,
+            exploitable: None,
             basis: basis.into(),
             instead: None,
             exact: None,
@@ -100,6 +108,8 @@ impl Audit {
             states_changed: Some(0),
             identity_holds: Some(true),
             true_return: Some(TrueReturn::made_up()),
+            critical: Some(Critical { k: None, breaks_ties: false }),
+            exploitable: Some(false),
             ..Self::new(AuditVerdict::PotentialBased, Some(true), "made up")
         }
     }

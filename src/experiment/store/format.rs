@@ -1,4 +1,5 @@
-//! The files of a unit: `monitor.csv`, `policy.csv`, `sweeps.csv`, and the marks in `result.json`.
+//! The files of a unit: `monitor.csv`, `policy.csv`, `values.csv`, `sweeps.csv`, and the marks in
+//! `result.json`.
 
 use std::fmt::Write;
 
@@ -6,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::experiment::hex;
-use crate::experiment::record::{EpisodeRow, UnitRecord};
+use crate::experiment::record::{EpisodeRow, StateValues, UnitRecord};
+use crate::learn::planning::Sweep;
 use crate::learn::{ParamValue, QTable, argmax_tol};
 use crate::mdp::Ending;
 use crate::script::{DiscretiserSpec, Variant};
@@ -23,7 +25,7 @@ pub(super) struct ResultFile {
     pub(super) seed: u64,
     pub(super) episodes: u32,
     pub(super) steps: u64,
-    /// Shape of the table of action values.
+    /// Shape of the table of action values; no actions if it holds state values.
     pub(super) states: usize,
     pub(super) actions: usize,
     pub(super) files: std::collections::BTreeMap<String, FileMark>,
@@ -50,6 +52,9 @@ fn csv_bytes(writer: csv::Writer<Vec<u8>>) -> Vec<u8> {
 
 const NEVER: &str = "writing to memory does not fail";
 
+/// The column of a predictor's errors.
+const VALUE_ERROR: &str = "value_error";
+
 /// Stable-Baselines3's monitor format: a JSON comment, then r, l, t and columns of our own. The
 /// time t is 0: wall time would make two equal runs differ; it is in `timing.json`.
 pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
@@ -57,6 +62,10 @@ pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
         format!("#{{\"t_start\": 0.0, \"env_id\": \"{}\"}}\n", variant.env.id).into_bytes();
     let mut csv = csv::Writer::from_writer(Vec::new());
     let mut header = vec!["r", "l", "t", "learned_return", "shaping", "epsilon", "ending"];
+    let has_errors = record.rows.iter().any(|row| row.value_error.is_some());
+    if has_errors {
+        header.push(VALUE_ERROR);
+    }
     header.extend(variant.terms.keys().map(String::as_str));
     csv.write_record(&header).expect(NEVER);
     for row in &record.rows {
@@ -69,6 +78,9 @@ pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
             float(row.epsilon),
             row.ending.as_str().to_string(),
         ];
+        if has_errors {
+            line.push(row.value_error.map_or_else(String::new, float));
+        }
         line.extend(row.terms.iter().map(|x| float(*x)));
         csv.write_record(&line).expect(NEVER);
     }
@@ -78,6 +90,8 @@ pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
 
 pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(bytes);
+    let has_errors = reader.headers().is_ok_and(|header| header.get(7) == Some(VALUE_ERROR));
+    let first_term = if has_errors { 8 } else { 7 };
     let mut rows = Vec::new();
     for (i, line) in reader.records().enumerate() {
         let line = line.map_err(|e| e.to_string())?;
@@ -89,21 +103,26 @@ pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
             learned: number(3)?,
             shaping: number(4)?,
             epsilon: number(5)?,
+            value_error: match line.get(7) {
+                Some(x) if has_errors && !x.is_empty() => Some(number(7)?),
+                _ => None,
+            },
             ending: match line.get(6) {
                 Some("terminated") => Ending::Terminated,
                 Some("truncated") => Ending::Truncated,
                 _ => return Err(bad()),
             },
-            terms: (7..line.len()).map(number).collect::<Result<_, _>>()?,
+            terms: (first_term..line.len()).map(number).collect::<Result<_, _>>()?,
         });
     }
     Ok(rows)
 }
 
-/// The value that a variant's table starts with; `None` for planners, which leave none of it, and
-/// where a function gives each its own.
+/// The value that a variant's table starts with; `None` if states differ in that, and for planners,
+/// which leave none of it.
 pub(super) fn initial_value(variant: &Variant) -> Option<f64> {
-    match variant.agent.params.get("initial_q") {
+    let params = &variant.agent.params;
+    match params.get("initial_q").or_else(|| params.get("initial_v")) {
         Some(ParamValue::Float(x)) => Some(*x),
         _ => None,
     }
@@ -178,10 +197,58 @@ pub(super) fn read_policy(
     Ok(table)
 }
 
-pub(super) fn sweeps(changes: &[f64]) -> Vec<u8> {
-    let mut text = String::from("sweep,largest_change\n");
-    for (i, change) in changes.iter().enumerate() {
-        writeln!(text, "{},{}", i + 1, float(*change)).expect(NEVER);
+const VALUES_HEADER: [&str; 3] = ["state", "v", "exact"];
+
+/// `state,v,exact`: the states that [`policy`] lists; `exact` is empty where the policy does not lead
+/// and without a model.
+pub(super) fn values(variant: &Variant, values: &StateValues) -> Vec<u8> {
+    let initial = initial_value(variant);
+    let all = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(VALUES_HEADER).expect(NEVER);
+    for (s, &v) in values.v.iter().enumerate() {
+        if all || !is_initial(&[v], initial) {
+            let exact = values.exact.get(s).copied().flatten().map_or_else(String::new, float);
+            csv.write_record([s.to_string(), float(v), exact]).expect(NEVER);
+        }
+    }
+    csv_bytes(csv)
+}
+
+/// A state with its value and the exact one.
+pub(super) type StoredValue = (usize, f64, Option<f64>);
+
+/// Reads what [`values`] writes, for `n_states`.
+pub(super) fn read_values(bytes: &[u8], n_states: usize) -> Result<Vec<StoredValue>, String> {
+    let mut reader = csv::Reader::from_reader(bytes);
+    if *reader.headers().map_err(|e| e.to_string())? != VALUES_HEADER[..] {
+        return Err(format!(
+            "holds no state values: its header is not `{}`",
+            VALUES_HEADER.join(",")
+        ));
+    }
+    let mut values = Vec::new();
+    for (i, line) in reader.records().enumerate() {
+        let line = line.map_err(|e| e.to_string())?;
+        let state = line[0].parse().ok().filter(|s| *s < n_states);
+        let (v, exact) = (line[1].parse().ok(), Some(&line[2]).filter(|x| !x.is_empty()));
+        let exact = exact.map(|x| x.parse::<f64>()).transpose();
+        match (state, v, exact) {
+            (Some(state), Some(v), Ok(exact)) => values.push((state, v, exact)),
+            _ => return Err(format!("line {}: no state among {n_states} with its value", i + 2)),
+        }
+    }
+    Ok(values)
+}
+
+/// `sweep,largest_change,error_bound,switched`: how a planner came to its solution; empty what is not
+/// known.
+pub(super) fn sweeps(sweeps: &[Sweep]) -> Vec<u8> {
+    let mut text = String::from("sweep,largest_change,error_bound,switched\n");
+    for (i, Sweep { change, bound, switched }) in sweeps.iter().enumerate() {
+        let bound = bound.map_or_else(String::new, float);
+        let switched = switched.map_or_else(String::new, |n| n.to_string());
+        writeln!(text, "{},{},{bound},{switched}", i + 1, float(*change)).expect(NEVER);
     }
     text.into_bytes()
 }

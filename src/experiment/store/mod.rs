@@ -15,10 +15,10 @@ use std::path::{Path, PathBuf};
 
 use self::atomic::{is_stale, sync_folder, temporary_prefix};
 use self::format::{
-    ResultFile, SCHEMA, initial_value, is_initial, mark, monitor, policy, read_monitor,
-    read_policy, sweeps,
+    ResultFile, SCHEMA, StoredValue, initial_value, is_initial, mark, monitor, policy,
+    read_monitor, read_policy, read_values, sweeps, values,
 };
-use super::record::{EpisodeRow, Learned, UnitRecord};
+use super::record::{EpisodeRow, Learned, UnitRecord, Values};
 use super::unit::Unit;
 use crate::learn::QTable;
 use crate::script::Variant;
@@ -61,18 +61,30 @@ pub struct StoredUnit {
     pub rows: Vec<EpisodeRow>,
     /// Its greedy policy and values: `(state, values)` of every state whose values were learned.
     pub q: Vec<(usize, Vec<f64>)>,
-    /// Number of states and actions of the table.
+    /// Its state values, if that is what was learned: `(state, value, exact value)`, of the same
+    /// states.
+    pub values: Vec<StoredValue>,
+    /// Number of states and actions of the table; no actions if it holds state values.
     pub shape: (usize, usize),
 }
 
 impl StoredUnit {
-    /// The table of action values, if the agent of `variant`, whose unit this is, keeps one.
+    /// The values, if the agent of `variant`, whose unit this is, keeps any.
     pub fn learned(&self, variant: &Variant) -> Option<Learned> {
         let (n_states, n_actions) = self.shape;
-        if n_actions == 0 {
+        let initial = initial_value(variant);
+        if n_states == 0 {
             return None;
         }
-        let initial = initial_value(variant);
+        if n_actions == 0 {
+            let mut v = vec![initial.unwrap_or(0.0); n_states];
+            let mut experienced = vec![false; n_states];
+            for &(s, value, _) in &self.values {
+                v[s] = value;
+                experienced[s] = !is_initial(&[value], initial);
+            }
+            return Some(Learned { values: Values::V(v), experienced });
+        }
         let mut q = QTable::new(n_states, n_actions, initial.unwrap_or(0.0));
         let mut experienced = vec![false; n_states];
         for (s, values) in &self.q {
@@ -81,7 +93,7 @@ impl StoredUnit {
             }
             experienced[*s] = !is_initial(values, initial);
         }
-        Some(Learned { q, experienced })
+        Some(Learned { values: Values::Q(q), experienced })
     }
 }
 
@@ -196,6 +208,9 @@ impl Store {
         if let Some(q) = &record.q {
             files.push(("policy.csv", policy(variant, q)));
         }
+        if let Some(v) = &record.values {
+            files.push(("values.csv", values(variant, v)));
+        }
         if !record.sweeps.is_empty() {
             files.push(("sweeps.csv", sweeps(&record.sweeps)));
         }
@@ -206,7 +221,10 @@ impl Store {
             seed: unit.seed,
             episodes: record.rows.len() as u32,
             steps: record.steps(),
-            states: record.q.as_ref().map_or(0, QTable::n_states),
+            states: record
+                .q
+                .as_ref()
+                .map_or(record.values.as_ref().map_or(0, |v| v.v.len()), QTable::n_states),
             actions: record.q.as_ref().map_or(0, QTable::n_actions),
             files: files.iter().map(|(name, bytes)| ((*name).into(), mark(bytes))).collect(),
         };
@@ -273,13 +291,16 @@ impl Store {
     pub fn load(&self, unit: &Unit) -> Result<StoredUnit, StoreError> {
         let (result, files) = self.verified(unit)?;
         let folder = self.path(unit);
-        let mut stored =
-            StoredUnit { rows: Vec::new(), q: Vec::new(), shape: (result.states, result.actions) };
+        let shape = (result.states, result.actions);
+        let mut stored = StoredUnit { rows: Vec::new(), q: Vec::new(), values: Vec::new(), shape };
         for (name, bytes) in &files {
             let bad = |what: String| StoreError::new(&folder.join(name), what);
             match name.as_str() {
                 "monitor.csv" => stored.rows = read_monitor(bytes).map_err(bad)?,
                 "policy.csv" => stored.q = read_policy(bytes, stored.shape).map_err(bad)?,
+                "values.csv" => {
+                    stored.values = read_values(bytes, stored.shape.0).map_err(bad)?;
+                }
                 _ => {}
             }
         }

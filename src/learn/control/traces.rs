@@ -10,7 +10,7 @@
 //! Deviation 2: where step sizes differ from pair to pair, each pair is changed with its own.
 
 use super::{Tabular, td_error};
-use crate::learn::{QTable, Rate, StepSize};
+use crate::learn::{Rate, StepSize};
 
 /// What a visit does to a trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,12 +62,12 @@ impl Traces {
         let delta = td_error(q.values()[pair], reward, *gamma, next_value);
         let step = alpha.visit(pair);
         self.visit(pair);
-        self.learn(q, delta, step, alpha);
+        self.learn(q.values_mut(), delta, step, alpha);
     }
 
     /// `pair` has been visited.
     #[inline]
-    fn visit(&mut self, pair: usize) {
+    pub(in crate::learn) fn visit(&mut self, pair: usize) {
         let one = 1.0 / self.scale;
         let place = self.place[pair];
         if place == NOWHERE {
@@ -82,11 +82,16 @@ impl Traces {
         }
     }
 
-    /// `Q ← Q + α δ e` for every pair, then `e ← γ λ e`. `alpha` is that of the step, `rates` those
+    /// `Q ← Q + α δ e` for every pair of `values`, then `e ← γ λ e`. `alpha` is that of the step, `rates` those
     /// of the pairs where they differ.
     #[inline]
-    fn learn(&mut self, q: &mut QTable, delta: f64, alpha: f64, rates: &StepSize) {
-        let values = q.values_mut();
+    pub(in crate::learn) fn learn(
+        &mut self,
+        values: &mut [f64],
+        delta: f64,
+        alpha: f64,
+        rates: &StepSize,
+    ) {
         match rates.rates() {
             None => {
                 let change = alpha * delta * self.scale;
@@ -142,7 +147,7 @@ impl Traces {
 
     /// `e ← 0` for every pair.
     #[inline]
-    pub(super) fn clear(&mut self) {
+    pub(in crate::learn) fn clear(&mut self) {
         for entry in self.entries.drain(..) {
             self.place[entry.pair as usize] = NOWHERE;
         }
@@ -153,7 +158,7 @@ impl Traces {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::{AlphaSource, Schedule};
+    use crate::learn::{AlphaSource, QTable, Schedule};
     use crate::mdp::streams::Stream;
 
     const PAIRS: usize = 12;
@@ -170,7 +175,7 @@ mod tests {
             let (pair, delta) = (random.below(PAIRS), random.uniform() - 0.5);
             let step = alpha.visit(pair);
             traces.visit(pair);
-            traces.learn(&mut q, delta, step, &alpha);
+            traces.learn(q.values_mut(), delta, step, &alpha);
             dense[pair] = if kind == Trace::Replacing { 1.0 } else { dense[pair] + 1.0 };
             for i in 0..PAIRS {
                 values[i] += alpha.rates().map_or(step, |rates| rates[i]) * delta * dense[i];
@@ -212,7 +217,7 @@ mod tests {
         traces.visit(0);
         // The trace is 1, 0.5, 0.25, 0.125, and then below the cutoff.
         for left in [1, 1, 1, 0, 0] {
-            traces.learn(&mut q, 1.0, 1.0, &alpha);
+            traces.learn(q.values_mut(), 1.0, 1.0, &alpha);
             assert_eq!(traces.entries.len(), left);
         }
         assert_eq!(q.values(), [1.875, 0.0, 0.0, 0.0]);

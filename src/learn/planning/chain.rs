@@ -121,6 +121,46 @@ impl Chain {
         self.values(&self.components(), &self.rewards, None, Precision::Rounding)
     }
 
+    /// The closed components, in order.
+    pub(super) fn recurrent(&self) -> Vec<Vec<usize>> {
+        let components = self.components();
+        let closed = (0..components.len()).filter(|&c| self.closed(&components, c));
+        let mut sets: Vec<Vec<usize>> = closed
+            .map(|c| {
+                let mut set: Vec<usize> = components.nodes(c).iter().map(|&s| s as usize).collect();
+                set.sort_unstable();
+                set
+            })
+            .collect();
+        sets.sort_unstable();
+        sets
+    }
+
+    /// The average reward per step in a closed component: what is collected until the first state
+    /// is met again, by the time that takes (renewal reward theorem).
+    pub(super) fn average(&self, closed: &[usize]) -> Result<f64, PlanError> {
+        let mut position = vec![0; self.len()];
+        for (i, &s) in closed.iter().enumerate() {
+            position[s] = i;
+        }
+        let mut totals = [0.0; 2];
+        for (total, reward) in totals.iter_mut().zip([None, Some(1.0)]) {
+            let mut system = System::new(closed.len());
+            for &s in closed {
+                let entries = self.entries(s).map(|(to, p)| (position[to], p));
+                entries.filter(|(to, _)| *to != 0).for_each(|(to, p)| system.push(to, p));
+                system.end_row(reward.unwrap_or(self.rewards[s]));
+            }
+            let mut x = vec![0.0; closed.len()];
+            if !system.solve(&mut x, Precision::Rounding) {
+                return Err(PlanError::NotSolved(closed.len()));
+            }
+            *total = x[0];
+        }
+        let average = totals[0] / totals[1];
+        if average.is_finite() { Ok(average) } else { Err(PlanError::NotFinite) }
+    }
+
     /// Without discounting a policy that may never end has no value.
     fn refuse_endless(&self, components: &Components) -> Result<(), PlanError> {
         if self.gamma < 1.0 {

@@ -30,6 +30,20 @@ pub struct Dynamics {
     ends: Vec<bool>,
 }
 
+/// The transitions of [`Dynamics`] backwards.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sources {
+    offsets: Vec<u32>,
+    pairs: Vec<u32>,
+}
+
+impl Sources {
+    /// The pairs that may lead to `place`, in order.
+    pub fn of(&self, place: usize) -> &[u32] {
+        &self.pairs[self.offsets[place] as usize..self.offsets[place + 1] as usize]
+    }
+}
+
 /// The place of a state that takes no part.
 const NONE: u32 = u32::MAX;
 
@@ -99,6 +113,11 @@ impl Dynamics {
         self.states[place] as usize
     }
 
+    /// Number of states of the model, taking part or not.
+    pub fn n_model_states(&self) -> usize {
+        self.places.len()
+    }
+
     /// The place of the model's state `s`; `None` if it takes no part.
     #[inline]
     pub fn place(&self, s: usize) -> Option<usize> {
@@ -116,6 +135,26 @@ impl Dynamics {
     #[inline]
     pub fn ends(&self, i: usize) -> bool {
         self.ends[i]
+    }
+
+    /// The pairs that may lead to each state.
+    pub fn sources(&self) -> Sources {
+        let mut offsets = vec![0u32; self.len() + 2];
+        for &to in &self.next {
+            offsets[to as usize + 2] += 1;
+        }
+        for s in 2..offsets.len() {
+            offsets[s] += offsets[s - 1];
+        }
+        let mut pairs = vec![0u32; self.next.len()];
+        for i in 0..self.len() * self.n_actions {
+            for &to in self.next(i).0 {
+                let at = &mut offsets[to as usize + 1];
+                pairs[*at as usize] = i as u32;
+                *at += 1;
+            }
+        }
+        Sources { offsets, pairs }
     }
 
     /// The expectation of `per_outcome`, a function of the index into [`FiniteMdp::outcomes`] of
@@ -166,6 +205,26 @@ impl Dynamics {
         Chain::new(self, rewards, gamma, policy)
             .solve(None)
             .map_err(|e| e.of_model(|place| self.state(place)))
+    }
+
+    /// The sets of places that `policy` (by place) never leaves once it is in one, and in which it
+    /// comes everywhere again and again; in order.
+    pub fn recurrent(&self, policy: Policy<'_>) -> Vec<Vec<usize>> {
+        let none = vec![0.0; self.len() * self.n_actions];
+        Chain::new(self, &none, 1.0, policy).recurrent()
+    }
+
+    /// The average of `rewards` (one per pair) per step of `policy` in one of its recurrent sets.
+    ///
+    /// # Errors
+    /// If it cannot be computed.
+    pub fn average(
+        &self,
+        rewards: &[f64],
+        policy: Policy<'_>,
+        recurrent: &[usize],
+    ) -> Result<f64, PlanError> {
+        Chain::new(self, rewards, 1.0, policy).average(recurrent)
     }
 
     /// The probability that an episode under `policy` (by place) ends in a certain way, where

@@ -19,13 +19,13 @@ mod solution;
 mod value_iteration;
 
 pub use components::Components;
-pub use dynamics::{Dynamics, Over};
+pub use dynamics::{Dynamics, Over, Sources};
 pub use error::PlanError;
 pub use evaluation::{Policy, PolicyValue, policy_value};
 pub use planned_agent::PlannedAgent;
 pub use policy_iteration::{Optimum, PolicyIteration, Start};
 pub use problem::Problem;
-pub use solution::{Planner, Solution};
+pub use solution::{Planner, Solution, Sweep};
 pub use value_iteration::ValueIteration;
 
 #[cfg(test)]

@@ -41,6 +41,10 @@ impl Agent for PlannedAgent {
     fn q(&self) -> Option<&QTable> {
         Some(&self.solution.q)
     }
+
+    fn v(&self) -> Option<&[f64]> {
+        Some(&self.solution.v)
+    }
 }
 
 impl<S: Seen> Learn<S> for PlannedAgent {

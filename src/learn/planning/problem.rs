@@ -85,23 +85,7 @@ impl Problem<'_> {
     /// The place of a state from which no end can be reached.
     pub fn proper_policy(&self) -> Result<Vec<Action>, usize> {
         let (n, n_actions) = (self.dynamics.len(), self.dynamics.n_actions());
-        let pairs = (0..n * n_actions).filter(|&i| self.allows(i));
-        // The pairs that may lead to each state.
-        let mut offsets = vec![0u32; n + 2];
-        for i in pairs.clone() {
-            self.dynamics.next(i).0.iter().for_each(|&to| offsets[to as usize + 2] += 1);
-        }
-        for s in 2..offsets.len() {
-            offsets[s] += offsets[s - 1];
-        }
-        let mut sources = vec![0u32; offsets[n + 1] as usize];
-        for i in pairs.clone() {
-            for &to in self.dynamics.next(i).0 {
-                let at = &mut offsets[to as usize + 1];
-                sources[*at as usize] = i as u32;
-                *at += 1;
-            }
-        }
+        let sources = self.dynamics.sources();
         let mut policy = vec![None; n];
         let mut queue = std::collections::VecDeque::new();
         let reach = |i: usize, policy: &mut Vec<Option<Action>>| {
@@ -111,11 +95,11 @@ impl Problem<'_> {
             }
             first.then_some(i / n_actions)
         };
-        for i in pairs.filter(|&i| self.dynamics.ends(i)) {
+        for i in (0..n * n_actions).filter(|&i| self.allows(i) && self.dynamics.ends(i)) {
             queue.extend(reach(i, &mut policy));
         }
         while let Some(s) = queue.pop_front() {
-            for &i in &sources[offsets[s] as usize..offsets[s + 1] as usize] {
+            for &i in sources.of(s).iter().filter(|&&i| self.allows(i as usize)) {
                 queue.extend(reach(i as usize, &mut policy));
             }
         }

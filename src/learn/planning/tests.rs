@@ -130,6 +130,39 @@ fn the_shortest_way_out_of_a_corridor() {
     assert_eq!(found.changes.len(), found.switched.len());
 }
 
+/// Icy ground of 40 × 40 fields, −1 a step, out at one corner: large enough for rough evaluations
+/// first and for the Krylov method, discounted or not.
+#[test]
+fn two_ways_over_the_ice() {
+    const N: i32 = 40;
+    let to = |row: i32, col: i32| {
+        let next = (row.clamp(0, N - 1) * N + col.clamp(0, N - 1)) as u32;
+        outcome(1.0 / 3.0, next, -1.0, next == (N * N - 1) as u32)
+    };
+    let ways = [(0, -1), (1, 0), (0, 1), (-1, 0)];
+    let slip = |s: i32, a: usize| {
+        [3, 0, 1].map(|turn| ways[(a + turn) % 4]).map(|(r, c)| to(s / N + r, s % N + c)).to_vec()
+    };
+    let table: Vec<_> =
+        (0..N * N).map(|s| (0..4).map(|a| slip(s, a)).collect::<Vec<_>>()).collect();
+    let mut initial = vec![0.0; table.len()];
+    initial[0] = 1.0;
+    let mdp = FiniteMdp::new(&table, initial).unwrap();
+    let zero = vec![0.0; table.len()];
+    for gamma in [0.99, 1.0] {
+        let exact = PolicyIteration { gamma }.solve(&mdp, &zero).unwrap();
+        assert!(exact.converged && exact.bound.is_none_or(|bound| bound < 1e-9));
+        let vi = ValueIteration { gamma, theta: 1e-12, max_sweeps: 100_000 };
+        let swept = vi.solve(&mdp, &zero).unwrap();
+        for s in 0..table.len() - 1 {
+            assert!((exact.v[s] - swept.v[s]).abs() < 1e-8, "{gamma}, {s}");
+        }
+        let value =
+            policy_value(&mdp, gamma, Policy::Deterministic(&exact.policy), Over::Reachable);
+        assert!((value.unwrap().v[0] - exact.v[0]).abs() < 1e-9);
+    }
+}
+
 /// A loop that pays has no undiscounted value; the error says where it is.
 #[test]
 fn a_loop_that_pays_is_named() {

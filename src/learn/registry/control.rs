@@ -28,32 +28,33 @@ fn schedules(c: &AgentConfig) -> Option<(Schedule, Schedule)> {
     }
 }
 
-fn traces(c: &AgentConfig, setup: &Setup) -> Traces {
+/// The traces of `n_entries`.
+pub(super) fn traces(c: &AgentConfig, n_entries: usize) -> Traces {
     let kind = match c.word("traces") {
         "replacing" => Trace::Replacing,
         _ => Trace::Accumulating,
     };
     let decay = c.float("gamma") * c.float("lambda");
-    Traces::new(kind, decay, c.float("trace_cutoff"), setup.n_states * setup.n_actions)
+    Traces::new(kind, decay, c.float("trace_cutoff"), n_entries)
 }
 
 const ONE_STEP: &[ParamSpec] = &[STEP_SIZE, GAMMA, EPSILON, EXPLORATION, INITIAL_Q];
 
-const LAMBDA: ParamSpec = ParamSpec {
+pub(super) const LAMBDA: ParamSpec = ParamSpec {
     name: "lambda",
     kind: UNIT,
     function: None,
     default: ParamValue::Float(0.9),
     doc: "decay of the traces: 0 looks one step ahead, 1 to the end of the episode",
 };
-const TRACES: ParamSpec = ParamSpec {
+pub(super) const TRACES: ParamSpec = ParamSpec {
     name: "traces",
     kind: ParamKind::Word(&["accumulating", "replacing"]),
     function: None,
     default: ParamValue::Word("accumulating"),
     doc: "what a visit does to a trace: adds 1, or sets it to 1",
 };
-const TRACE_CUTOFF: ParamSpec = ParamSpec {
+pub(super) const TRACE_CUTOFF: ParamSpec = ParamSpec {
     name: "trace_cutoff",
     kind: UNIT,
     function: None,
@@ -146,7 +147,7 @@ pub(super) const SARSA_LAMBDA: AgentSpec = AgentSpec {
     build: Build::OnPolicy {
         bootstraps: true,
         build: |c, setup| {
-            let traces = traces(c, &setup);
+            let traces = traces(c, setup.n_states * setup.n_actions);
             AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
         },
     },
@@ -157,7 +158,7 @@ pub(super) const Q_LAMBDA: AgentSpec = AgentSpec {
     doc: "Watkins's Q(λ): traces are cut after exploration (Watkins 1989; Sutton & Barto 12.10)",
     params: WITH_TRACES,
     build: Build::Learner(|c, setup| {
-        let traces = traces(c, &setup);
+        let traces = traces(c, setup.n_states * setup.n_actions);
         AnyAgent::tabular(QLambda::new(table(c, setup), traces))
     }),
 };

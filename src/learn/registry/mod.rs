@@ -4,13 +4,17 @@
 //! A family of agents has a file of its own with a constant per agent, which [`AGENTS`] lists.
 
 mod control;
+mod monte_carlo;
 mod planners;
+mod prediction;
 mod shared;
 
 use super::control::{Advised, Backup};
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
+use super::prediction::GivenPolicy;
 use super::{Learn, QLearning, QTable, Sarsa};
+use crate::mdp::Action;
 use crate::mdp::streams::Stream;
 use crate::shaping::Shielded;
 
@@ -27,6 +31,10 @@ pub struct Setup {
     pub stream: Stream,
     /// Initial action values, shape `[n_states, n_actions]`, where a script gives them.
     pub initial_q: Option<Vec<f64>>,
+    /// Initial state values, shape `[n_states]`, where a script gives them.
+    pub initial_v: Option<Vec<f64>>,
+    /// What a predictor plays in each state, shape `[n_states]`; anything if there is nothing.
+    pub policy: Option<Vec<Action>>,
 }
 
 impl Setup {
@@ -35,6 +43,14 @@ impl Setup {
         match self.initial_q.take() {
             Some(values) => QTable::from_values(self.n_actions, values),
             None => QTable::new(self.n_states, self.n_actions, config.float("initial_q")),
+        }
+    }
+
+    /// What a predictor plays.
+    fn given_policy(self) -> GivenPolicy {
+        match self.policy {
+            Some(actions) => GivenPolicy::Fixed(actions),
+            None => GivenPolicy::Random { n_actions: self.n_actions, stream: self.stream },
         }
     }
 }
@@ -47,6 +63,8 @@ pub type BuildFn = fn(&AgentConfig, Setup) -> AnyAgent;
 pub enum Build {
     /// A learner.
     Learner(BuildFn),
+    /// A learner of the state values of a policy that is given.
+    Predictor(BuildFn),
     /// A learner of the values of the policy that it plays.
     OnPolicy {
         /// How it is built.
@@ -89,7 +107,7 @@ impl AgentSpec {
         match self.build {
             Build::OnPolicy { .. } => true,
             Build::OneStep { backup, .. } => backup != Backup::Best,
-            Build::Learner(_) | Build::Planner(_) => false,
+            Build::Learner(_) | Build::Predictor(_) | Build::Planner(_) => false,
         }
     }
 
@@ -166,6 +184,12 @@ impl AnyAgent {
 pub static AGENTS: &[AgentSpec] = &[
     control::Q_LEARNING,
     control::SARSA,
+    monte_carlo::MONTE_CARLO,
+    monte_carlo::OFF_POLICY_MONTE_CARLO,
+    prediction::MC_PREDICTION,
+    prediction::TD0,
+    prediction::TD_LAMBDA,
+    prediction::N_STEP_TD,
     control::EXPECTED_SARSA,
     control::DOUBLE_Q_LEARNING,
     control::N_STEP_SARSA,
@@ -174,6 +198,7 @@ pub static AGENTS: &[AgentSpec] = &[
     control::DYNA_Q,
     control::SOFT_Q_LEARNING,
     planners::VALUE_ITERATION,
+    planners::POLICY_ITERATION,
     planners::RANDOM_AGENT,
 ];
 

@@ -2,7 +2,7 @@
 
 use super::shared::GAMMA;
 use super::{AgentSpec, AnyAgent, Build};
-use crate::learn::planning::ValueIteration;
+use crate::learn::planning::{PolicyIteration, ValueIteration};
 use crate::learn::{ParamKind, ParamSpec, ParamValue, RandomAgent};
 
 pub(super) const VALUE_ITERATION: AgentSpec = AgentSpec {
@@ -32,6 +32,13 @@ pub(super) const VALUE_ITERATION: AgentSpec = AgentSpec {
             max_sweeps: c.int("max_sweeps") as usize,
         })
     }),
+};
+
+pub(super) const POLICY_ITERATION: AgentSpec = AgentSpec {
+    name: "policy_iteration",
+    doc: "policy iteration with exact evaluation, then greedy play (Sutton & Barto 4.3)",
+    params: &[GAMMA],
+    build: Build::Planner(|c| Box::new(PolicyIteration { gamma: c.float("gamma") })),
 };
 
 pub(super) const RANDOM_AGENT: AgentSpec = AgentSpec {

@@ -1,6 +1,6 @@
 //! Parameters that several agents have.
 
-use crate::learn::{Exploration, ParamKind, ParamSpec, ParamValue, Schedule, Signature};
+use crate::learn::{Exploration, ParamKind, ParamSpec, ParamValue, Schedule, Signature, Visits};
 
 pub(super) const UNIT: ParamKind = ParamKind::Float { min: 0.0, max: 1.0, open: false };
 pub(super) const ANY: ParamKind =
@@ -18,6 +18,9 @@ pub(super) const STEP_SIZE: ParamSpec = ParamSpec {
     doc: "step size: a number, a schedule, or visit_count() for 1/N(s, a)",
     ..ALPHA
 };
+/// A step size that makes a value the mean of what it learns from.
+pub(super) const MEAN: ParamSpec =
+    ParamSpec { default: ParamValue::VisitCount { omega: 1.0 }, ..STEP_SIZE };
 pub(super) const GAMMA: ParamSpec = ParamSpec {
     name: "gamma",
     kind: UNIT,
@@ -31,6 +34,13 @@ pub(super) const EPSILON: ParamSpec = ParamSpec {
     function: None,
     default: ParamValue::Schedule(Schedule::Constant { value: 0.1 }),
     doc: "exploration rate: a number or a schedule",
+};
+pub(super) const VISITS: ParamSpec = ParamSpec {
+    name: "visits",
+    kind: ParamKind::Word(Visits::WORDS),
+    function: None,
+    default: ParamValue::Word("first"),
+    doc: "which visits of an episode count",
 };
 pub(super) const EXPLORATION: ParamSpec = ParamSpec {
     name: "exploration",
