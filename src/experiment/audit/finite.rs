@@ -162,7 +162,8 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         exact.change = pair.policy_change().ok();
         if verdict == AuditVerdict::NotPotentialBased {
             exact.critical = pair.critical().ok();
-            exact.hacking = pair.hacking().ok().flatten();
+            let change = exact.change.as_ref();
+            exact.hacking = change.and_then(|change| pair.hacking(change).ok().flatten());
         }
     }
     audit.true_return =
