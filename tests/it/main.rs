@@ -27,6 +27,7 @@ mod shield;
 mod show;
 mod solved;
 mod support;
+mod theory;
 mod toy_text;
 mod unreadable;
 mod variants;

@@ -208,3 +208,31 @@ fn look_back_advice_is_in_the_columns_and_comes_with_a_warning() {
     records.iter().for_each(adds_up);
     assert_ne!(played(&records[0]), played(&records[2]));
 }
+
+/// A potential that comes to rest leaves what it leaves at rest.
+#[test]
+fn what_is_learned_under_a_potential_that_settles() {
+    let plan = plan_of(
+        r#"
+        fn closer(s) { 1.0 - 0.05 * (s.row + s.col) }
+        let base = experiment(#{
+            env: env("FrozenLake-v1", #{ is_slippery: false }),
+            agent: q_learning(#{ alpha: 0.5, gamma: 0.9, epsilon: 1.0 }), episodes: 6000,
+        });
+        [
+            base.with(#{ name: "plain" }),
+            base.with(#{ name: "moving", potential: |s, i| closer(s) * (1.0 + 0.99 ** i) }),
+        ]
+        "#,
+        &[],
+    );
+    let records = run(&plan, 0);
+    let [plain, moving] = [&records[0], &records[1]].map(|r| r.q.as_ref().unwrap());
+    // Holes and the goal are no states to act in.
+    for s in (0..16).filter(|s| ![5, 7, 11, 12, 15].contains(s)) {
+        for a in 0..4 {
+            let phi = 1.0 - 0.05 * (s / 4 + s % 4) as f64;
+            assert!((moving.get(s, a) + phi - plain.get(s, a)).abs() < 1e-9, "{s}, {a}");
+        }
+    }
+}
