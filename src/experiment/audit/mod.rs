@@ -73,6 +73,8 @@ pub struct Audit {
     pub basis: String,
     /// What a potential could do in its place, if it is none.
     pub instead: Option<String>,
+    /// What of the native reward is shaping already, if there is something of the kind.
+    pub remark: Option<&'static str>,
     /// Everything found on the finite model.
     #[serde(skip)]
     pub exact: Option<Box<Exact>>,
@@ -97,6 +99,7 @@ impl Audit {
             exploitable: None,
             basis: basis.into(),
             instead: None,
+            remark: None,
             exact: None,
             continuous: None,
         }
@@ -166,13 +169,6 @@ pub fn audit_variant(
     variant: &Variant,
     thorough: Option<Thorough<'_>>,
 ) -> Result<Audit, Diagnostic> {
-    if !variant.is_shaped() && !variant.changes_reward() {
-        let basis = "the agent learns from the native reward";
-        return Ok(Audit::new(AuditVerdict::Unshaped, Some(true), basis));
-    }
-    if variant.shaping.advice.is_some() && variant.shaping.advice_on == AdviceOn::LookBack {
-        return Ok(look_back(variant));
-    }
     let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     env.visit(Judge { host, variant, thorough }).map_err(|fault| {
         host.annotate(diagnostic_of(fault).note(format!("in variant `{}`", variant.name)))
@@ -189,22 +185,36 @@ impl EnvVisitor for Judge<'_> {
     type Out = Result<Audit, Fault>;
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
+        let remark = env.own_shaping();
+        Ok(Audit { remark, ..self.judge(&env)? })
+    }
+}
+
+impl Judge<'_> {
+    fn judge<E: Env + Clone + 'static>(self, env: &E) -> Result<Audit, Fault> {
         let Self { host, variant, thorough } = self;
+        if !variant.is_shaped() && !variant.changes_reward() {
+            let basis = "the agent learns from the native reward";
+            return Ok(Audit::new(AuditVerdict::Unshaped, Some(true), basis));
+        }
+        if variant.shaping.advice.is_some() && variant.shaping.advice_on == AdviceOn::LookBack {
+            return Ok(look_back(variant));
+        }
         // Features have no cells: what is said is said of the states themselves.
         let on_states = matches!(
             variant.discretiser,
             DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_)
         );
         if on_states && variant.frame_skip == 1 && env.finite().is_some() {
-            return finite::judge(host, variant, &env);
+            return finite::judge(host, variant, env);
         }
         let mut audit = if variant.changes_reward() {
-            continuous::try_out(host, variant, &env)?
+            continuous::try_out(host, variant, env)?
         } else {
             by_construction(variant)
         };
         if let Some(thorough) = thorough {
-            continuous::model(variant, &env, thorough, &mut audit)?;
+            continuous::model(variant, env, thorough, &mut audit)?;
         }
         Ok(audit)
     }

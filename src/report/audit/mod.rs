@@ -28,6 +28,9 @@ pub fn audit_text(variant: &Variant, audit: &Audit) -> String {
     if let Some(continuous) = &audit.continuous {
         sampled(continuous, &mut lines);
     }
+    if let Some(remark) = audit.remark {
+        lines.item("note", remark);
+    }
     if let Some(instead) = &audit.instead {
         lines.item("instead", instead);
     }
