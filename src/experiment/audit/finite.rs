@@ -151,8 +151,7 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         exact.change = pair.policy_change().ok();
         if verdict == AuditVerdict::NotPotentialBased {
             exact.critical = pair.critical().ok();
-            let change = exact.change.as_ref();
-            exact.hacking = change.and_then(|change| pair.hacking(change).ok().flatten());
+            exact.hacking = exact.change.as_ref().and_then(|c| pair.hacking(c).ok()?);
         }
     }
     audit.true_return =
