@@ -101,13 +101,18 @@ fn one_tiling_is_a_table() {
                 config.params.insert("initial_q", ParamValue::Float(0.7));
             }
             let stream = || Stream::new(4, "agent");
-            let Build::Learner(build) = spec.build else { panic!("{}", spec.name) };
+            let build = match spec.build {
+                Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. } => build,
+                Build::Predictor(_) | Build::Planner(_) => panic!("{}", spec.name),
+            };
             let setup = Setup {
                 n_states: ROWS,
                 n_actions: ACTIONS,
                 seed: 4,
                 stream: stream(),
                 initial_q: None,
+                initial_v: None,
+                policy: None,
             };
             let mut table = build(&config, setup).boxed();
             let shape = features(FeatureKind::Tiles(1), &[(0.0, 4.0, 4), (0.0, 3.0, 3)]);
