@@ -8,8 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
 use crate::experiment::{Audit, Thorough, audit_variant};
-use crate::report::audit_json::audit_json;
-use crate::report::audit_text::audit_text;
+use crate::report::audit::{audit_json, audit_text};
 use crate::report::claims::{broken_promises, judge_audits, rehearse};
 use crate::script::{Host, load};
 
@@ -90,7 +89,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// Progress of one variant's audit, shown if it has several parts.
-fn bar(name: &str) -> ProgressBar {
+pub(super) fn bar(name: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
     if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent} %") {
         bar.set_style(style);

@@ -15,6 +15,7 @@ mod output;
 mod parity;
 mod play;
 mod rollout;
+mod score;
 mod screen;
 mod show;
 mod view;
@@ -42,6 +43,8 @@ enum Command {
     Check(check::Args),
     /// Say of each shaping whether it keeps the optimal policy: the proof, or what goes wrong
     Audit(audit::Args),
+    /// Rank the potentials of a study before anything is trained
+    Score(score::Args),
     /// List environments, agents, functions, keys or examples
     List(list::Args),
     /// Play actions in an environment and print what happens
@@ -151,6 +154,7 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
         Command::Exec(args) => exec::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Audit(args) => audit::run(&args),
+        Command::Score(args) => score::run(&args),
         Command::List(args) => list::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Show(args) => show::run(&args),

@@ -3,7 +3,7 @@
 use super::predict::{Exact, given_policy};
 use super::shaped::{learner, potential};
 use super::shielded::playable;
-use crate::learn::planning::PlannedAgent;
+use crate::learn::planning::{PlannedAgent, Sweep};
 use crate::learn::registry::{Build, Setup};
 use crate::learn::{AnyAgent, Learn, LinearSetup};
 use crate::mdp::streams::Stream;
@@ -288,8 +288,8 @@ pub(super) fn learned_model<E: Env + Clone + 'static>(
 /// An agent, and what is known about what it does.
 pub(super) struct Assembled {
     pub(super) agent: AnyAgent,
-    /// A planner's largest change per sweep; empty for learners.
-    pub(super) sweeps: Vec<f64>,
+    /// How a planner came to its solution; empty for learners.
+    pub(super) sweeps: Vec<Sweep>,
     /// What a predictor should learn, where there is a model.
     pub(super) exact: Option<Exact>,
 }
@@ -305,7 +305,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
     match variant.agent.spec.build {
         Build::Learner(build)
         | Build::Predictor(build)
-        | Build::OnPolicy(build)
+        | Build::OnPolicy { build, .. }
         | Build::OneStep { build, .. } => {
             let function = |name: &str| variant.agent_functions.get(name);
             let initial_q = function("initial_q")
@@ -334,7 +334,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let model = learned_model(host, variant, env)?;
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
             let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
-            let sweeps = solution.changes.clone();
+            let sweeps = solution.sweeps(planner.gamma());
             let agent = AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma()));
             Ok(Assembled { agent, sweeps, exact: None })
         }

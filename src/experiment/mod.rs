@@ -18,6 +18,7 @@ mod landscape;
 pub mod play;
 mod predict;
 mod record;
+mod score;
 mod shaped;
 mod shielded;
 mod starts;
@@ -43,6 +44,7 @@ pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use landscape::{Landscape, ListedState};
 pub use predict::has_exact_values;
 pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
+pub use score::{Scored, score_variant};
 pub use store::{
     Store, StoreError, StoredUnit, holds_weights, read_table, read_weights, write_atomically,
     write_atomically_with,

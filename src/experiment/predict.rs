@@ -82,9 +82,7 @@ impl Exact {
         let chain = chain(&mdp, &shares(host, variant, env, &mdp, policy)?);
         let reached = chain.reachable();
         let gamma = variant.agent.float("gamma");
-        let only = vec![0; chain.n_states()];
-        let Ok(value) = policy_value(&chain, gamma, Policy::Deterministic(&only), Over::Reachable)
-        else {
+        let Ok(value) = policy_value(&chain, gamma, Policy::Uniform, Over::Reachable) else {
             return Ok(None);
         };
         let v: Vec<Option<f64>> =
@@ -180,5 +178,42 @@ impl EnvVisitor for Ask<'_> {
         let Some(n_states) = env.n_states() else { return Ok(false) };
         let policy = given_policy(self.host, self.variant, &env, n_states)?;
         Ok(Exact::new(self.host, self.variant, &env, policy.as_deref())?.is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_over_the_states_that_the_policy_reaches() {
+        let v = vec![Some(1.0), None, Some(-2.0)];
+        let exact = Exact { v, reached: vec![(0, 1.0), (2, -2.0)] };
+        // The root of (3² + 4²) / 2.
+        assert_eq!(exact.error(&[4.0, 99.0, 2.0]), 12.5f64.sqrt());
+        assert_eq!(exact.error(&[1.0, 99.0, -2.0]), 0.0);
+    }
+
+    #[test]
+    fn errors_are_spaced_where_they_would_cost() {
+        let exact = |n| Exact { v: Vec::new(), reached: vec![(0, 0.0); n] };
+        assert_eq!(exact(1000).spacing(10_000), 1);
+        assert_eq!(exact(1000).spacing(10_001), 2);
+        assert_eq!(exact(500).spacing(1_000_000), 50);
+        assert_eq!(exact(1).spacing(1), 1);
+    }
+
+    #[test]
+    fn a_chain_is_the_model_under_the_policy() {
+        // Action 0 ends with 1, action 1 stays for -1: with π(0) = 1/4, V = 1/4 - 3/4 + 3/4 γ V.
+        let outcome = |reward, terminated| {
+            vec![Outcome { probability: 1.0, next_state: 0, reward, terminated }]
+        };
+        let table = [vec![outcome(1.0, true), outcome(-1.0, false)]];
+        let mdp = FiniteMdp::new(&table, vec![1.0]).unwrap();
+        let chain = chain(&mdp, &[0.25, 0.75]);
+        assert_eq!(chain.n_actions(), 1);
+        let value = policy_value(&chain, 0.8, Policy::Uniform, Over::Reachable).unwrap().v[0];
+        assert!((value - -0.5 / (1.0 - 0.75 * 0.8)).abs() < 1e-15, "{value}");
     }
 }

@@ -1,5 +1,6 @@
 //! What a unit leaves behind.
 
+use crate::learn::planning::Sweep;
 use crate::learn::{LinearQ, QTable};
 use crate::mdp::Ending;
 use crate::shaping::Features;
@@ -39,8 +40,8 @@ pub struct UnitRecord {
     pub weights: Option<QTable>,
     /// The state values learned, if they are what the agent learns.
     pub values: Option<StateValues>,
-    /// A planner's largest change per sweep; empty for learners.
-    pub sweeps: Vec<f64>,
+    /// How a planner came to its solution; empty for learners.
+    pub sweeps: Vec<Sweep>,
 }
 
 /// State values with what they should be.

@@ -10,6 +10,7 @@ use super::record::{EpisodeRow, StateValues, UnitRecord};
 use super::train::{Limits, TrainError, World, train};
 use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
+use crate::learn::planning::Sweep;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
 use crate::learn::{AnyAgent, Learn};
 use crate::mdp::Env;
@@ -172,7 +173,7 @@ struct Parts<E: Env> {
 
 /// What a unit knows about its agent beyond what it learns.
 struct Extra {
-    sweeps: Vec<f64>,
+    sweeps: Vec<Sweep>,
     exact: Option<Exact>,
 }
 
@@ -276,7 +277,7 @@ impl RunUnit<'_> {
             each(row.steps);
             if let (Some(exact), Some(v)) = (&exact, agent.v()) {
                 let episode = rows.len() as u32;
-                let due = episode % spacing == 0 || episode + 1 == limits.episodes;
+                let due = episode.is_multiple_of(spacing) || episode + 1 == limits.episodes;
                 row.value_error = due.then(|| exact.error(v));
             }
             rows.push(row);

@@ -139,6 +139,12 @@ pub trait Env: Send + Sync {
         None
     }
 
+    /// What of the native reward is shaping already and no potential's, in words, with a way to do
+    /// without; `None` if there is nothing of the kind.
+    fn own_shaping(&self) -> Option<&'static str> {
+        None
+    }
+
     /// The names of the state's numbers, in the order of [`Self::fields`]' output.
     fn schema(&self) -> Schema;
 

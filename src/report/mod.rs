@@ -15,8 +15,7 @@
 //! - `runs`: a variant's units, gathered for tables and plots
 //! - `svg`: scales, ticks and escaping for hand-written SVG
 
-pub mod audit_json;
-pub mod audit_text;
+pub mod audit;
 pub mod claims;
 pub mod closing;
 mod colours;
@@ -30,6 +29,7 @@ pub mod picture;
 pub mod picture_svg;
 pub mod results;
 mod runs;
+pub mod score;
 pub mod stored;
 pub mod summary;
 mod svg;

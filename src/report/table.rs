@@ -396,7 +396,12 @@ mod tests {
             (r.solved, r.steps_per_second, r.verdict) = (None, None, String::new());
         }
         rows[0].value_error = Some((0.034_56, Some((0.03, 0.041))));
-        insta::assert_snapshot!(StudyTable { rows, notes: vec![] }.render(), @r"");
+        insta::assert_snapshot!(StudyTable { rows, notes: vec![] }.render(), @r"
+        variant      final mean      final IQM [95 %]       value error [95 %]
+        ──────────────────────────────────────────────────────────────────────
+        td0              -0.750  0.500 [0.400, 0.600]  0.0346 [0.0300, 0.0410]
+        monte carlo      -0.750  0.500 [0.400, 0.600]
+        ");
     }
 
     #[test]

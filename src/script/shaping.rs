@@ -299,7 +299,7 @@ fn advice(
         AdviceOn::LookBack if agent.float("gamma") == 0.0 => {
             return Err(Diagnostic::error("look-back advice divides by gamma, which is 0"));
         }
-        AdviceOn::LookBack if agent.spec.is_one_step() => {
+        AdviceOn::LookBack if !agent.spec.learns_from_returns() => {
             let warning = Diagnostic::warning(format!(
                 "with `{name}` look-back advice can change which policy is best"
             ));

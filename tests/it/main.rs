@@ -1,6 +1,7 @@
 //! Integration tests: one binary, one module a subject.
 
 mod blackjack;
+mod book_figures;
 mod cli;
 mod crash;
 mod env;
@@ -14,6 +15,7 @@ mod numbers;
 mod parity;
 mod placing;
 mod play;
+mod prediction;
 mod readme;
 mod refusals;
 mod render;
@@ -25,6 +27,8 @@ mod shield;
 mod show;
 mod solved;
 mod support;
+mod theory;
 mod toy_text;
 mod unreadable;
+mod variants;
 mod wiewiora;

@@ -7,8 +7,8 @@ use runner::env::{AnyEnv, make};
 use runner::experiment::{EpisodeRow, Limits, World, train};
 use runner::learn::{Agent, Last, Learn, QTable};
 use runner::mdp::numpy::NumpyRng;
-use runner::mdp::{Action, Ending};
-use runner::shaping::{CellPotential, NativeReward, NoPotential, Potential, StateIndex};
+use runner::mdp::{Action, Ending, FiniteState};
+use runner::shaping::{CellPotential, Fault, NativeReward, NoPotential, Potential, StateIndex};
 use serde_json::json;
 
 const GAMMA: f64 = 0.9;
@@ -77,13 +77,16 @@ fn phi(s: usize) -> f64 {
     10.0 + s as f64
 }
 
-fn play<P: Potential<FrozenLake>>(potential: P, agent: &mut Scribe, max_steps: u32) -> EpisodeRow {
+fn lake() -> FrozenLake {
     let kwargs = json!({ "is_slippery": false });
-    let AnyEnv::FrozenLake(env) = make("FrozenLake-v1", kwargs.as_object().unwrap()).unwrap()
-    else {
-        unreachable!("the id says so")
-    };
-    let discretiser = StateIndex { n_states: 16 };
+    match make("FrozenLake-v1", kwargs.as_object().unwrap()).unwrap() {
+        AnyEnv::FrozenLake(env) => env,
+        _ => unreachable!("the id says so"),
+    }
+}
+
+fn play<P: Potential<FrozenLake>>(potential: P, agent: &mut Scribe, max_steps: u32) -> EpisodeRow {
+    let (env, discretiser) = (lake(), StateIndex { n_states: 16 });
     let mut world = World { env, discretiser, potential, reward: NativeReward };
     let limits = Limits { episodes: 1, max_steps: Some(max_steps), ..Limits::EPISODE };
     let mut rng = NumpyRng::from_u64(0);
@@ -157,4 +160,42 @@ fn phi_is_evaluated_once_per_visited_state() {
     // Up and down: the start is visited again and again.
     play(counted, &mut Scribe::new(&[3, 3, 1, 3, 1, 3, 1, 3], true), 8);
     assert_eq!(calls.get(), 2);
+}
+
+/// A potential that is another at every evaluation; it writes down what it said.
+struct Drifting(Vec<f64>);
+
+impl Potential<FrozenLake> for Drifting {
+    fn phi(&mut self, _: &FrozenLake, cell: usize, _: &FiniteState) -> Result<f64, Fault> {
+        self.0.push(phi(cell) * (1.0 + 1e-3 * self.0.len() as f64));
+        Ok(self.0[self.0.len() - 1])
+    }
+}
+
+/// Φ(s′) is stored on arrival and is what is subtracted on leaving (Devlin & Kudenko 2012).
+#[test]
+fn a_potential_that_drifts_telescopes_since_it_is_not_evaluated_anew() {
+    let mut agent = Scribe::new(&TO_THE_GOAL, true);
+    play(Drifting(Vec::new()), &mut agent, 100);
+    let discounted = |rewards: &[f64]| rewards.iter().rev().fold(0.0, |sum, r| r + GAMMA * sum);
+    let goal = discounted(&[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    // At the start Φ was asked first.
+    let error = discounted(&agent.rewards) - goal + phi(0);
+    assert!(error.abs() < 1e-14, "{error}");
+    // The control: asked anew on leaving, the potential has drifted in between.
+    let mut drifting = Drifting(Vec::new());
+    let mut sum = 0.0;
+    let path = [0, 4, 8, 9, 10, 14];
+    let ask = |drifting: &mut Drifting, cell: usize| {
+        let nothing = FiniteState { index: 0, outcome: 0 };
+        drifting.phi(&lake(), cell, &nothing).unwrap()
+    };
+    let mut discount = 1.0;
+    for (i, &s) in path.iter().enumerate() {
+        let leaving = ask(&mut drifting, s);
+        let arriving = path.get(i + 1).map_or(0.0, |&next| ask(&mut drifting, next));
+        sum += discount * (GAMMA * arriving - leaving);
+        discount *= GAMMA;
+    }
+    assert!((sum + drifting.0[0]).abs() > 1e-2, "{sum}");
 }

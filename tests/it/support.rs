@@ -9,7 +9,7 @@ use runner::learn::registry::{AgentSpec, Build, BuildFn};
 /// How a learner of action values is built; `None` for planners and predictors.
 pub(crate) fn build_of(spec: &AgentSpec) -> Option<BuildFn> {
     match spec.build {
-        Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. } => {
+        Build::Learner(build) | Build::OnPolicy { build, .. } | Build::OneStep { build, .. } => {
             Some(build)
         }
         Build::Predictor(_) | Build::Planner(_) => None,

@@ -42,6 +42,14 @@ impl Env for LunarLander {
         self.step_continuous([action[0], action[1]], rng)
     }
 
+    fn own_shaping(&self) -> Option<&'static str> {
+        self.mission.native_shaping.then_some(
+            "the environment's own reward is shaped by the difference of a potential with γ = 1, of \
+             which the last value is never taken back: with a smaller γ that is no potential's. \
+             `shaping: \"none\"` leaves it out, and a `potential` does it properly",
+        )
+    }
+
     fn schema(&self) -> Schema {
         let turn = 2.0 * std::f64::consts::PI;
         let actions = if self.mission.continuous {

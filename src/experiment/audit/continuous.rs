@@ -2,13 +2,16 @@
 
 use serde::Serialize;
 
-use super::finite::settings;
+use super::finite::{TrueReturn, settings};
 use super::learned::Learned;
 use super::named::Naming;
 use super::{Audit, AuditVerdict, Thorough};
-use crate::audit::{Pathwise, SampledSettings, cell_ranges, pathwise, preservation, sampled};
+use crate::audit::{
+    Pair, Pathwise, Query, QuerySettings, Sampled, SampledSettings, cell_ranges, pathwise, query,
+    sampled,
+};
 use crate::experiment::assemble::middle;
-use crate::mdp::Env;
+use crate::mdp::{Env, Schema};
 use crate::script::{DiscretiserSpec, Host, Variant};
 use crate::shaping::Fault;
 
@@ -19,6 +22,8 @@ pub struct Continuous {
     pub gamma: f64,
     /// Ways from the same states compared.
     pub pathwise: Option<Pathwise>,
+    /// Arbitrary states compared, reachable or not.
+    pub query: Option<Query>,
     /// The discretised environment, sampled and solved.
     pub model: Option<SampledModel>,
     /// What states and actions are called.
@@ -43,6 +48,8 @@ pub struct SampledModel {
     pub policy_preserved: Option<bool>,
     /// Cells whose greedy actions change.
     pub states_changed: Option<usize>,
+    /// What is lost in native return.
+    pub true_return: Option<TrueReturn>,
     /// Why nothing was compared.
     pub unsolved: Option<String>,
 }
@@ -51,39 +58,40 @@ pub struct SampledModel {
 const TRANSITIONS: usize = 3_000_000;
 /// States that are sampled in a cell at most, for each action.
 const SAMPLES: usize = 25;
+/// Quadruples of states that are compared.
+const QUADRUPLES: usize = 1_000;
 /// Episodes whose first states are looked at.
 const STARTS: usize = 10_000;
 
-/// Samples and solves the discretised environment, if there is a way to put it into a state.
-pub(super) fn model<E: Env + Clone + 'static>(
+/// The range of each field: that of the observation space, or its middle alone where that is
+/// unbounded.
+fn ranges(schema: &Schema) -> Vec<[f64; 2]> {
+    let fields = schema.fields.iter().zip(middle(schema));
+    let bounded = |low: f64, high: f64| low.is_finite() && high.is_finite();
+    fields
+        .map(|(f, middle)| if bounded(f.low, f.high) { [f.low, f.high] } else { [middle; 2] })
+        .collect()
+}
+
+/// The model of a discretised environment, with the states sampled per cell, if there are bins and a
+/// way to put the environment into a state.
+pub(in crate::experiment) fn sample<E: Env + Clone + 'static>(
     variant: &Variant,
     env: &E,
     thorough: Thorough<'_>,
-    audit: &mut Audit,
-) -> Result<(), Fault> {
-    let DiscretiserSpec::Bins(dims) = &variant.discretiser else { return Ok(()) };
+) -> Result<Option<(Sampled, usize)>, Fault> {
+    let DiscretiserSpec::Bins(dims) = &variant.discretiser else { return Ok(None) };
     let cells: usize = dims.iter().map(|d| d.n).product();
     let samples = (TRANSITIONS / (cells * env.n_actions()).max(1)).min(SAMPLES);
     if samples == 0 {
-        return Ok(());
+        return Ok(None);
     }
-    let schema = env.schema();
-    let middle = middle(&schema);
-    let ranges: Vec<[f64; 2]> =
-        schema
-            .fields
-            .iter()
-            .zip(middle)
-            .map(|(f, middle)| {
-                if f.low.is_finite() && f.high.is_finite() { [f.low, f.high] } else { [middle; 2] }
-            })
-            .collect();
-    let gamma = variant.agent.float("gamma");
+    let ranges = ranges(&env.schema());
     let settings = SampledSettings {
         n_cells: cells,
         samples,
         starts: STARTS,
-        gamma,
+        gamma: variant.agent.float("gamma"),
         frame_skip: variant.frame_skip,
         seed: 0,
         threads: thorough.threads,
@@ -93,20 +101,40 @@ pub(super) fn model<E: Env + Clone + 'static>(
         Learned::new(&host, variant, env).expect("it has been made before").into_asked()
     };
     let found = sampled(env, &settings, &cell_ranges(dims, &ranges), &asked, thorough.progress)?;
-    let Some(found) = found else { return Ok(()) };
-    let compared = preservation(&found.mdp, &found.shaped(), gamma, &found.phi);
+    Ok(found.map(|found| (found, samples)))
+}
+
+/// Samples and solves the discretised environment.
+pub(super) fn model<E: Env + Clone + 'static>(
+    variant: &Variant,
+    env: &E,
+    thorough: Thorough<'_>,
+    audit: &mut Audit,
+) -> Result<(), Fault> {
+    let Some((found, samples)) = sample(variant, env, thorough)? else { return Ok(()) };
+    let gamma = variant.agent.float("gamma");
+    let pair = Pair::new(&found.mdp, &found.shaping, gamma);
+    let compared = pair.as_ref().ok().map(|pair| pair.preservation(&found.phi));
+    let change = pair.as_ref().ok().and_then(|pair| pair.policy_change().ok());
     let model = SampledModel {
-        cells,
+        cells: found.excluded.len(),
         excluded: found.n_excluded(),
         samples,
         transitions: found.transitions,
         states: found.mdp.reachable().iter().filter(|r| **r).count(),
-        policy_preserved: compared.as_ref().ok().and_then(|p| p.verdict.preserved()),
-        states_changed: compared.as_ref().ok().map(|p| p.states_changed.len()),
-        unsolved: compared.err().map(|e| e.to_string()),
+        policy_preserved: compared.as_ref().and_then(|p| p.verdict.preserved()),
+        states_changed: compared.as_ref().map(|p| p.states_changed.len()),
+        true_return: change.map(|c| TrueReturn { optimal: c.optimal, shaped: c.worst }),
+        unsolved: pair.err().map(|e| e.to_string()),
     };
     let continuous = audit.continuous.get_or_insert_with(|| {
-        Box::new(Continuous { gamma, pathwise: None, model: None, naming: Naming::new(env) })
+        Box::new(Continuous {
+            gamma,
+            pathwise: None,
+            query: None,
+            model: None,
+            naming: Naming::new(env),
+        })
     });
     continuous.model = Some(model);
     Ok(())
@@ -144,10 +172,25 @@ pub(super) fn try_out<E: Env + Clone + 'static>(
     let mut learned = Learned::new(host, variant, env)?;
     let found = pathwise(env, &settings(variant), |env, t| learned.added(env, t))?;
     let (verdict, basis) = verdict(&found, None);
+    let gamma = variant.agent.float("gamma");
+    let mut asked = ranges(&env.schema());
+    if let DiscretiserSpec::Bins(dims) = &variant.discretiser {
+        for d in dims {
+            asked[d.field] = [d.lo, d.hi];
+        }
+    }
+    let settings =
+        QuerySettings { gamma, quadruples: QUADRUPLES, ranges: asked, terminates: true, seed: 0 };
+    // With a proof at hand, what states that may never be reached say is of no interest.
+    let query = match found.violation {
+        Some(_) => None,
+        None => query(env, &settings, |env, t| learned.added(env, t))?,
+    };
     let mut audit = Audit::new(verdict, None, basis);
     audit.continuous = Some(Box::new(Continuous {
-        gamma: variant.agent.float("gamma"),
+        gamma,
         pathwise: Some(found),
+        query,
         model: None,
         naming: Naming::new(env),
     }));

@@ -7,8 +7,9 @@ use super::named::Naming;
 use super::replacement::replacement;
 use super::{Audit, AuditVerdict, beyond_states};
 use crate::audit::{
-    Advantages, Expected, Finding, Pathwise, PathwiseSettings, Pattern, Preservation, Scaling,
-    Strict, pathwise, pattern, preservation, strict,
+    Advantages, BrokenTask, Critical, Cycle, Expected, Finding, Hacking, NotSsp, Pair, Pathwise,
+    PathwiseSettings, Pattern, PolicyChange, Preservation, Scaling, SspCheck, Strict, Unsolved,
+    broken_task, pathwise, pattern, strict,
 };
 use crate::experiment::assemble::{NotAModelError, learned_model};
 use crate::experiment::shielded::playable;
@@ -51,6 +52,17 @@ pub struct Exact {
     pub pattern: Pattern,
     /// Both models solved and compared; `None` if they cannot be.
     pub preservation: Option<Preservation>,
+    /// What is lost in native return.
+    pub change: Option<PolicyChange>,
+    /// How far the added reward could be scaled before the optimal actions change; not asked of
+    /// potentials, for which there is no limit.
+    pub critical: Option<Critical>,
+    /// The loop that pays better than the task.
+    pub hacking: Option<Hacking>,
+    /// With γ = 1, a loop that pays for ever: there is no optimal policy for the learned reward.
+    pub endless: Option<Cycle>,
+    /// A task on the same dynamics that the added reward would break.
+    pub broken_task: Option<BrokenTask>,
     /// Episodes compared, where there is no model of the reward.
     pub pathwise: Option<Pathwise>,
     /// What states and actions are called.
@@ -75,6 +87,11 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         starc: None,
         pattern: Pattern::Other,
         preservation: None,
+        change: None,
+        critical: None,
+        hacking: None,
+        endless: None,
+        broken_task: None,
         pathwise: None,
         naming: Naming::new(env),
     };
@@ -103,50 +120,75 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         exact.starc = Some(advantages.starc());
     }
     let potential_only = !variant.changes_reward();
-    let compared = preservation(mdp, &model.shaped, gamma, &model.phi);
-    let preserved = compared.as_ref().ok().and_then(|p| p.verdict.preserved());
-    let (verdict, basis) = match (checked.finding, preserved) {
-        (Finding::Holds, Some(true)) if potential_only => (
-            AuditVerdict::PotentialBased,
-            beyond_states(variant)
-                .unwrap_or("exact: Q_F + Φ = Q and the greedy sets are equal")
-                .into(),
-        ),
-        (Finding::Holds, Some(true)) => (
-            AuditVerdict::PotentialBased,
-            "exact: every transition agrees with one potential".into(),
-        ),
-        (Finding::Fails, Some(true)) => {
-            (AuditVerdict::NotPotentialBased, "exact: the greedy sets are equal".into())
+    let pair = Pair::new(mdp, &f, gamma);
+    let compared = pair.as_ref().ok().map(|pair| pair.preservation(&model.phi));
+    let preserved = match (&compared, &pair) {
+        (Some(compared), _) => compared.verdict.preserved(),
+        // Whoever goes round for ever earns without limit: no policy of the task's is optimal.
+        (None, Err(Unsolved::Learned(SspCheck::NotSsp { why: NotSsp::PayingLoop { .. }, .. }))) => {
+            Some(false)
         }
-        (Finding::Fails, Some(false)) => {
-            (AuditVerdict::NotPotentialBased, "exact: the greedy sets differ".into())
-        }
-        (finding, _) => {
-            let verdict = match finding {
-                Finding::Holds => AuditVerdict::PotentialBased,
-                Finding::Fails => AuditVerdict::NotPotentialBased,
-                Finding::Inconclusive => AuditVerdict::Inconclusive,
-            };
-            let why = match &compared {
-                Ok(_) => "two actions are too close for the numbers to decide".to_string(),
-                Err(e) => e.to_string(),
-            };
-            (verdict, why)
-        }
+        _ => None,
     };
+    let verdict = match checked.finding {
+        Finding::Holds => AuditVerdict::PotentialBased,
+        Finding::Fails => AuditVerdict::NotPotentialBased,
+        Finding::Inconclusive => AuditVerdict::Inconclusive,
+    };
+    let basis = basis(variant, verdict, preserved, pair.as_ref().err());
     let mut audit = Audit::new(verdict, preserved, basis);
     if verdict == AuditVerdict::NotPotentialBased {
         audit.instead = Some(replacement(variant, exact.pattern, Some(&checked)));
+        exact.broken_task = broken_task(mdp, &dynamics, &f, gamma).ok().flatten();
     }
+    if let Err(Unsolved::Learned(SspCheck::NotSsp {
+        why: NotSsp::PayingLoop { cycle, .. }, ..
+    })) = &pair
+    {
+        exact.endless.clone_from(cycle);
+    }
+    if let Ok(pair) = &pair {
+        exact.change = pair.policy_change().ok();
+        if verdict == AuditVerdict::NotPotentialBased {
+            exact.critical = pair.critical().ok();
+            let change = exact.change.as_ref();
+            exact.hacking = change.and_then(|change| pair.hacking(change).ok().flatten());
+        }
+    }
+    audit.true_return =
+        exact.change.as_ref().map(|c| TrueReturn { optimal: c.optimal, shaped: c.worst });
+    audit.critical = exact.critical;
+    audit.exploitable = Some(exact.hacking.is_some() || exact.endless.is_some());
     exact.strict = Some(checked);
-    if let Ok(compared) = compared {
+    if let Some(compared) = compared {
         audit.states_changed = Some(compared.states_changed.len());
         audit.identity_holds = potential_only.then(|| compared.identity_holds());
         exact.preservation = Some(compared);
     }
     audit.exact = Some(Box::new(exact));
     Ok(audit)
+}
+
+/// On what the verdict on two models rests.
+fn basis(
+    variant: &Variant,
+    verdict: AuditVerdict,
+    preserved: Option<bool>,
+    unsolved: Option<&Unsolved>,
+) -> String {
+    let text = match (unsolved, preserved, verdict) {
+        (Some(unsolved), ..) => return unsolved.to_string(),
+        (_, None, _) => "two actions are too close for the numbers to decide",
+        (_, Some(false), _) => "exact: the greedy sets differ",
+        (_, Some(true), AuditVerdict::PotentialBased) if variant.changes_reward() => {
+            "exact: every transition agrees with one potential"
+        }
+        (_, Some(true), AuditVerdict::PotentialBased) => {
+            beyond_states(variant).unwrap_or("exact: Q_F + Φ = Q and the greedy sets are equal")
+        }
+        (_, Some(true), _) => "exact: the greedy sets are equal",
+    };
+    text.into()
 }
 
 /// A reward that depends on more than the transition: episodes can still be compared.

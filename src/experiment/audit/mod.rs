@@ -10,12 +10,13 @@ mod replacement;
 use serde::Serialize;
 
 use super::assemble::diagnostic_of;
-use crate::audit::{Pathwise, Preservation};
+use crate::audit::{Critical, Pathwise, Preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
 use crate::script::{AdviceOn, Diagnostic, DiscretiserSpec, Host, PhiOn, Plan, Variant};
 use crate::shaping::Fault;
 
+pub(super) use continuous::sample;
 pub use continuous::{Continuous, SampledModel};
 pub use finite::{Exact, TrueReturn};
 pub use named::Naming;
@@ -63,10 +64,17 @@ pub struct Audit {
     /// What the best policy earns, and what the policy that is best for the shaped reward earns, in
     /// the environment's own reward, where the model is known.
     pub true_return: Option<TrueReturn>,
+    /// How far the added reward could be scaled before the optimal actions change, where the model is
+    /// known and the reward is no potential's.
+    pub critical: Option<Critical>,
+    /// Whether there is a loop that pays better than the task, where the model is known.
+    pub exploitable: Option<bool>,
     /// On what the verdict rests, in one line.
     pub basis: String,
     /// What a potential could do in its place, if it is none.
     pub instead: Option<String>,
+    /// What of the native reward is shaping already, if there is something of the kind.
+    pub remark: Option<&'static str>,
     /// Everything found on the finite model.
     #[serde(skip)]
     pub exact: Option<Box<Exact>>,
@@ -87,8 +95,11 @@ impl Audit {
             states_changed: None,
             identity_holds: None,
             true_return: None,
+            critical: None,
+            exploitable: None,
             basis: basis.into(),
             instead: None,
+            remark: None,
             exact: None,
             continuous: None,
         }
@@ -100,6 +111,8 @@ impl Audit {
             states_changed: Some(0),
             identity_holds: Some(true),
             true_return: Some(TrueReturn::made_up()),
+            critical: Some(Critical { k: None, breaks_ties: false }),
+            exploitable: Some(false),
             ..Self::new(AuditVerdict::PotentialBased, Some(true), "made up")
         }
     }
@@ -156,13 +169,6 @@ pub fn audit_variant(
     variant: &Variant,
     thorough: Option<Thorough<'_>>,
 ) -> Result<Audit, Diagnostic> {
-    if !variant.is_shaped() && !variant.changes_reward() {
-        let basis = "the agent learns from the native reward";
-        return Ok(Audit::new(AuditVerdict::Unshaped, Some(true), basis));
-    }
-    if variant.shaping.advice.is_some() && variant.shaping.advice_on == AdviceOn::LookBack {
-        return Ok(look_back(variant));
-    }
     let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     env.visit(Judge { host, variant, thorough }).map_err(|fault| {
         host.annotate(diagnostic_of(fault).note(format!("in variant `{}`", variant.name)))
@@ -179,22 +185,36 @@ impl EnvVisitor for Judge<'_> {
     type Out = Result<Audit, Fault>;
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
+        let remark = env.own_shaping();
+        Ok(Audit { remark, ..self.judge(&env)? })
+    }
+}
+
+impl Judge<'_> {
+    fn judge<E: Env + Clone + 'static>(self, env: &E) -> Result<Audit, Fault> {
         let Self { host, variant, thorough } = self;
+        if !variant.is_shaped() && !variant.changes_reward() {
+            let basis = "the agent learns from the native reward";
+            return Ok(Audit::new(AuditVerdict::Unshaped, Some(true), basis));
+        }
+        if variant.shaping.advice.is_some() && variant.shaping.advice_on == AdviceOn::LookBack {
+            return Ok(look_back(variant));
+        }
         // Features have no cells: what is said is said of the states themselves.
         let on_states = matches!(
             variant.discretiser,
             DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_)
         );
         if on_states && variant.frame_skip == 1 && env.finite().is_some() {
-            return finite::judge(host, variant, &env);
+            return finite::judge(host, variant, env);
         }
         let mut audit = if variant.changes_reward() {
-            continuous::try_out(host, variant, &env)?
+            continuous::try_out(host, variant, env)?
         } else {
             by_construction(variant)
         };
         if let Some(thorough) = thorough {
-            continuous::model(variant, &env, thorough, &mut audit)?;
+            continuous::model(variant, env, thorough, &mut audit)?;
         }
         Ok(audit)
     }
@@ -202,11 +222,12 @@ impl EnvVisitor for Judge<'_> {
 
 /// What a learner knows of advice on the step before is gone when it bootstraps.
 fn look_back(variant: &Variant) -> Audit {
-    let basis = if variant.agent.spec.is_one_step() {
-        "look-back advice: a learner that bootstraps does not take all of it back"
-    } else {
-        "look-back advice is taken back over whole returns only"
-    };
+    if variant.agent.spec.learns_from_returns() && !variant.changes_reward() {
+        let basis = "by construction: a return takes back the advice on the step before it, and \
+                     no more";
+        return Audit::new(AuditVerdict::PotentialBased, Some(true), basis);
+    }
+    let basis = "look-back advice: a learner that bootstraps does not take all of it back";
     Audit::new(AuditVerdict::Inconclusive, None, basis)
 }
 

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use crate::experiment::hex;
 use crate::experiment::record::{EpisodeRow, StateValues, UnitRecord};
+use crate::learn::planning::Sweep;
 use crate::learn::{ParamValue, QTable, argmax_tol};
 use crate::mdp::Ending;
 use crate::script::{DiscretiserSpec, Variant};
@@ -251,7 +252,7 @@ pub(super) fn read_values(bytes: &[u8], n_states: usize) -> Result<Vec<StoredVal
         let line = line.map_err(|e| e.to_string())?;
         let state = line[0].parse().ok().filter(|s| *s < n_states);
         let (v, exact) = (line[1].parse().ok(), Some(&line[2]).filter(|x| !x.is_empty()));
-        let exact = exact.map(|x| x.parse::<f64>()).transpose();
+        let exact = exact.map(str::parse::<f64>).transpose();
         match (state, v, exact) {
             (Some(state), Some(v), Ok(exact)) => values.push((state, v, exact)),
             _ => return Err(format!("line {}: no state among {n_states} with its value", i + 2)),
@@ -260,10 +261,14 @@ pub(super) fn read_values(bytes: &[u8], n_states: usize) -> Result<Vec<StoredVal
     Ok(values)
 }
 
-pub(super) fn sweeps(changes: &[f64]) -> Vec<u8> {
-    let mut text = String::from("sweep,largest_change\n");
-    for (i, change) in changes.iter().enumerate() {
-        writeln!(text, "{},{}", i + 1, float(*change)).expect(NEVER);
+/// `sweep,largest_change,error_bound,switched`: how a planner came to its solution; empty what is not
+/// known.
+pub(super) fn sweeps(sweeps: &[Sweep]) -> Vec<u8> {
+    let mut text = String::from("sweep,largest_change,error_bound,switched\n");
+    for (i, Sweep { change, bound, switched }) in sweeps.iter().enumerate() {
+        let bound = bound.map_or_else(String::new, float);
+        let switched = switched.map_or_else(String::new, |n| n.to_string());
+        writeln!(text, "{},{},{bound},{switched}", i + 1, float(*change)).expect(NEVER);
     }
     text.into_bytes()
 }

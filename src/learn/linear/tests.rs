@@ -102,7 +102,9 @@ fn one_tiling_is_a_table() {
             }
             let stream = || Stream::new(4, "agent");
             let build = match spec.build {
-                Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. } => build,
+                Build::Learner(build)
+                | Build::OnPolicy { build, .. }
+                | Build::OneStep { build, .. } => build,
                 Build::Predictor(_) | Build::Planner(_) => panic!("{}", spec.name),
             };
             let setup = Setup {

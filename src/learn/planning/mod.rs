@@ -25,7 +25,7 @@ pub use evaluation::{Policy, PolicyValue, policy_value};
 pub use planned_agent::PlannedAgent;
 pub use policy_iteration::{Optimum, PolicyIteration, Start};
 pub use problem::Problem;
-pub use solution::{Planner, Solution};
+pub use solution::{Planner, Solution, Sweep};
 pub use value_iteration::ValueIteration;
 
 #[cfg(test)]

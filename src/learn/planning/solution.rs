@@ -20,6 +20,17 @@ pub trait Planner {
     fn gamma(&self) -> f64;
 }
 
+/// What a sweep over the states, or an iteration over policies, changed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep {
+    /// The largest change of a value.
+    pub change: f64,
+    /// No value is further than this from the optimum; `None` where that is not known.
+    pub bound: Option<f64>,
+    /// How many states it gave another action; `None` where policies are not what is iterated.
+    pub switched: Option<usize>,
+}
+
 /// What a planner found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
@@ -39,4 +50,21 @@ pub struct Solution {
     /// No value is further than this from the optimum; `None` with γ = 1, where no such bound is
     /// known.
     pub bound: Option<f64>,
+}
+
+impl Solution {
+    /// How the planner, which discounts by `gamma`, came closer to it: sweep by sweep. After a sweep
+    /// of value iteration the values are within `change · γ / (1 − γ)` of the optimum.
+    pub fn sweeps(&self, gamma: f64) -> Vec<Sweep> {
+        let last = self.changes.len().saturating_sub(1);
+        let sweep = |(i, &change): (usize, &f64)| {
+            let switched = self.switched.get(i).copied();
+            let bound = match switched {
+                None => (gamma < 1.0).then(|| change * gamma / (1.0 - gamma)),
+                Some(_) => self.bound.filter(|_| i == last),
+            };
+            Sweep { change, bound, switched }
+        };
+        self.changes.iter().enumerate().map(sweep).collect()
+    }
 }

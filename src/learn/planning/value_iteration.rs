@@ -83,4 +83,25 @@ mod tests {
         let vi = ValueIteration { gamma: 0.9, theta: 1e-12, max_sweeps: 1 };
         assert!(!vi.solve(&model(), &[0.0; 2]).unwrap().converged);
     }
+
+    #[test]
+    fn every_sweep_leaves_a_bound() {
+        let (gamma, max_sweeps) = (0.9, 100);
+        let exact = ValueIteration { gamma, theta: 0.0, max_sweeps }.solve(&model(), &[0.0; 2]);
+        let exact = exact.unwrap().v;
+        for max_sweeps in 1..5 {
+            let vi = ValueIteration { gamma, theta: 1e-12, max_sweeps };
+            let solution = vi.solve(&model(), &[0.0; 2]).unwrap();
+            let sweeps = solution.sweeps(gamma);
+            assert_eq!(sweeps.len(), solution.changes.len());
+            let last = sweeps[sweeps.len() - 1];
+            assert_eq!((last.bound, last.switched), (solution.bound, None));
+            let pairs = solution.v.iter().zip(&exact);
+            let error = pairs.map(|(v, exact)| (v - exact).abs()).fold(0.0, f64::max);
+            assert!(error <= last.bound.unwrap());
+        }
+        let undiscounted = ValueIteration { gamma: 1.0, theta: 0.0, max_sweeps };
+        let solution = undiscounted.solve(&model(), &[0.0; 2]).unwrap();
+        assert!(solution.sweeps(1.0).iter().all(|sweep| sweep.bound.is_none()));
+    }
 }

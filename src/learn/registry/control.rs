@@ -139,9 +139,10 @@ pub(super) const N_STEP_SARSA: AgentSpec = AgentSpec {
         EXPLORATION,
         INITIAL_Q,
     ],
-    build: Build::OnPolicy(|c, setup| {
-        AnyAgent::tabular(NStepSarsa::new(table(c, setup), c.int("n") as usize))
-    }),
+    build: Build::OnPolicy {
+        bootstraps: true,
+        build: |c, setup| AnyAgent::tabular(NStepSarsa::new(table(c, setup), c.int("n") as usize)),
+    },
     linear: None,
 };
 
@@ -149,10 +150,13 @@ pub(super) const SARSA_LAMBDA: AgentSpec = AgentSpec {
     name: "sarsa_lambda",
     doc: "SARSA(λ) with eligibility traces (Rummery 1995; Sutton & Barto 12.7)",
     params: WITH_TRACES,
-    build: Build::OnPolicy(|c, setup| {
-        let traces = traces(c, setup.n_states * setup.n_actions);
-        AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
-    }),
+    build: Build::OnPolicy {
+        bootstraps: true,
+        build: |c, setup| {
+            let traces = traces(c, setup.n_states * setup.n_actions);
+            AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
+        },
+    },
     linear: Some(linear::sarsa_lambda),
 };
 

@@ -1,12 +1,9 @@
 //! Agents that learn action values from the returns of whole episodes.
 
-use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, STEP_SIZE, VISITS};
+use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, MEAN, VISITS};
 use super::{AgentSpec, AnyAgent, Build};
 use crate::learn::{MonteCarlo, OffPolicyMonteCarlo, ParamKind, ParamSpec, ParamValue, Visits};
 use crate::mdp::streams::Stream;
-
-/// The mean of the returns.
-const MEAN: ParamSpec = ParamSpec { default: ParamValue::VisitCount { omega: 1.0 }, ..STEP_SIZE };
 
 /// The switch that makes episodes start anywhere.
 const EXPLORING_STARTS: ParamSpec = ParamSpec {
@@ -21,22 +18,25 @@ pub(super) const MONTE_CARLO: AgentSpec = AgentSpec {
     name: "monte_carlo",
     doc: "on-policy Monte Carlo control (Sutton & Barto 5.3, 5.4)",
     params: &[MEAN, GAMMA, EPSILON, EXPLORATION, VISITS, EXPLORING_STARTS, INITIAL_Q],
-    build: Build::Learner(|c, mut setup| {
-        let table = setup.table(c);
-        let agent = MonteCarlo::new(
-            table,
-            c.float("gamma"),
-            c.alpha(),
-            (c.exploration(), c.schedule("epsilon")),
-            Visits::of_word(c.word("visits")),
-            setup.stream,
-        );
-        AnyAgent::tabular(if c.is_on(EXPLORING_STARTS.name) {
-            agent.with_exploring_starts(Stream::new(setup.seed, "first actions"))
-        } else {
-            agent
-        })
-    }),
+    build: Build::OnPolicy {
+        bootstraps: false,
+        build: |c, mut setup| {
+            let table = setup.table(c);
+            let agent = MonteCarlo::new(
+                table,
+                c.float("gamma"),
+                c.alpha(),
+                (c.exploration(), c.schedule("epsilon")),
+                Visits::of_word(c.word("visits")),
+                setup.stream,
+            );
+            AnyAgent::tabular(if c.is_on(EXPLORING_STARTS.name) {
+                agent.with_exploring_starts(Stream::new(setup.seed, "first actions"))
+            } else {
+                agent
+            })
+        },
+    },
     linear: None,
 };
 

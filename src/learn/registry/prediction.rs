@@ -1,7 +1,7 @@
 //! Agents that learn the state values of a policy that is given.
 
 use super::control::{LAMBDA, TRACE_CUTOFF, TRACES, traces};
-use super::shared::{ANY, GAMMA, STEP_SIZE, VISITS};
+use super::shared::{ANY, GAMMA, MEAN, STEP_SIZE, VISITS};
 use super::{AgentSpec, AnyAgent, Build, Setup};
 use crate::learn::prediction::{
     Estimate, MonteCarloPrediction, NStepTd, Prediction, Rule, Td0, TdLambda,
@@ -39,7 +39,7 @@ where
 pub(super) const MC_PREDICTION: AgentSpec = AgentSpec {
     name: "mc_prediction",
     doc: "V of a given policy by Monte Carlo (Sutton & Barto 5.1)",
-    params: &[POLICY, STEP_SIZE, GAMMA, VISITS, INITIAL_V],
+    params: &[POLICY, MEAN, GAMMA, VISITS, INITIAL_V],
     build: Build::Predictor(|c, setup| {
         let visits = Visits::of_word(c.word("visits"));
         predictor(c, setup, |n_states| MonteCarloPrediction::new(visits, n_states))

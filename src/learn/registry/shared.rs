@@ -18,6 +18,9 @@ pub(super) const STEP_SIZE: ParamSpec = ParamSpec {
     doc: "step size: a number, a schedule, or visit_count() for 1/N(s, a)",
     ..ALPHA
 };
+/// A step size that makes a value the mean of what it learns from.
+pub(super) const MEAN: ParamSpec =
+    ParamSpec { default: ParamValue::VisitCount { omega: 1.0 }, ..STEP_SIZE };
 pub(super) const GAMMA: ParamSpec = ParamSpec {
     name: "gamma",
     kind: UNIT,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::audit::{Certificate, Walk};
+use crate::audit::{Certificate, Cycle, Walk};
 use crate::experiment::{Audit, Exact};
 use crate::script::{Plan, Variant};
 
@@ -42,6 +42,14 @@ fn variant_json(variant: &Variant, audit: &Audit) -> Value {
         };
         Some(compared.states_changed.iter().map(change).collect::<Vec<_>>())
     }));
+    value["policy"] = plain(exact.and_then(|e| e.change.as_ref()));
+    value["loop"] = match exact {
+        Some(Exact { hacking: Some(hacking), .. }) => plain(hacking),
+        Some(Exact { endless: Some(cycle), .. }) => json!({ "cycle": cycle }),
+        _ => Value::Null,
+    };
+    value["counterexample"] = plain(exact.and_then(|e| e.broken_task.as_ref()));
+    value["query"] = plain(continuous.and_then(|c| c.query.as_ref()));
     value["trajectories"] = plain(audit.pathwise());
     value["sampled_model"] = plain(continuous.and_then(|c| c.model.as_ref()));
     value["state_names"] = json!(names(exact));
@@ -55,6 +63,11 @@ fn variant_json(variant: &Variant, audit: &Audit) -> Value {
 /// The proof as the two ways that should be paid the same.
 fn certificate(exact: Option<&Exact>) -> Option<Value> {
     exact?.strict.as_ref()?.certificate.as_ref().map(plain)
+}
+
+/// The loop that pays.
+fn cycle(exact: &Exact) -> Option<&Cycle> {
+    exact.hacking.as_ref().map(|hacking| &hacking.cycle).or(exact.endless.as_ref())
 }
 
 /// What the states are called that are mentioned by their index.
@@ -73,5 +86,8 @@ fn names(exact: Option<&Exact>) -> BTreeMap<usize, String> {
         mentioned.extend(states(direct));
         mentioned.extend(states(detour));
     }
+    mentioned.extend(cycle(exact).map(|c| c.states.as_slice()).unwrap_or_default());
+    mentioned.extend(exact.broken_task.as_ref().map(|task| task.start));
+    mentioned.extend(exact.change.as_ref().map(|change| change.worst_state));
     mentioned.into_iter().map(|s| (s, exact.naming.state(s))).collect()
 }
