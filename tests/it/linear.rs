@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use runner::env::Session;
-use runner::experiment::{audit_variant, run_unit, units};
+use runner::experiment::{AuditVerdict, audit_variant, run_unit, units};
 use runner::script::{Host, Plan, load};
 
 use crate::support::{
@@ -315,14 +315,17 @@ fn the_audit_of_linear_values_is_that_of_the_problem() {
     let lake = "env: \"FrozenLake-v1\", agent: sarsa(),
         discretiser: tiles(#{ row: [0, 4, 4], col: [0, 4, 4], tilings: 4 }), ";
     let exact = audit(&format!("{lake} potential: |s| 0.1 * s.row"));
-    assert_eq!((exact.verdict.as_str(), exact.identity_holds), ("potential-based", Some(true)));
+    assert_eq!((exact.verdict, exact.identity_holds), (AuditVerdict::PotentialBased, Some(true)));
     let changed = audit(&format!("{lake} terms: #{{ cost: |t| -0.01 * t.state.row }}"));
     assert!(changed.states_changed.is_some());
     let car = "env: \"MountainCar-v0\", agent: sarsa(), discretiser: fourier(3), ";
     let by_construction = audit(&format!("{car} potential: |s| s.position"));
-    assert_eq!(by_construction.verdict.as_str(), "potential-based");
+    assert_eq!(by_construction.verdict, AuditVerdict::PotentialBased);
+    assert_eq!(by_construction.policy_preserved, Some(true));
     assert_eq!(by_construction.basis, "by construction: Φ is a function of the state");
-    assert_eq!(audit(&format!("{car} reward: |t| -2.0")).verdict.as_str(), "not-potential-based");
+    // Speed pays on the way to and fro: no potential does that.
+    let bonus = audit(&format!("{car} terms: #{{ speed: |t| abs(t.next_state.velocity) }}"));
+    assert_eq!(bonus.verdict, AuditVerdict::NotPotentialBased);
 }
 
 /// Ten seeds of CartPole: with 81 Fourier features, and with tiles, far better than with bins of
