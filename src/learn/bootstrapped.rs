@@ -24,7 +24,7 @@ pub fn stability_bound(gamma: f64) -> f64 {
 pub struct Bootstrapped {
     agent: Box<dyn TabularAgent>,
     eta: f64,
-    /// V_n(S).
+    /// `V_n(S)`.
     v: f64,
     /// The sum of the terms over the episode.
     shaping: f64,

@@ -9,6 +9,8 @@ mod floors;
 mod frozen_lake;
 mod golden;
 mod language;
+mod linear;
+mod mountain_car_tiles;
 mod numbers;
 mod parity;
 mod placing;

@@ -72,7 +72,7 @@ impl Learn<Shielded> for Witness {
 
 /// On the 8x8 lake: left is refused everywhere, up in odd columns.
 fn refused(s: usize) -> ActionSet {
-    if s % 2 == 0 { ActionSet(0b1110) } else { ActionSet(0b0110) }
+    if s.is_multiple_of(2) { ActionSet(0b1110) } else { ActionSet(0b0110) }
 }
 
 /// Lets every learner loose behind the shield; what is refused has tempting values.
@@ -99,7 +99,7 @@ impl EnvVisitor for Temptation {
                 }
                 let Some(build) = build_of(spec) else { continue };
                 let agent = build(&config, setup(&env)).boxed();
-                self.tempt(spec.name, &env, agent);
+                Self::tempt(spec.name, &env, agent);
                 tried += 1;
             }
         }
@@ -118,7 +118,7 @@ fn setup<E: Env>(env: &E) -> Setup {
 }
 
 impl Temptation {
-    fn tempt<E: Env + Clone>(&self, name: &str, env: &E, agent: Box<dyn TabularAgent>) {
+    fn tempt<E: Env + Clone>(name: &str, env: &E, agent: Box<dyn TabularAgent>) {
         let n_states = env.n_states().unwrap();
         // The lake's fields are row, column, index and tile.
         let allowed: ShieldFn = Box::new(|fields| Ok(refused(fields[2] as usize)));

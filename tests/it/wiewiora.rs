@@ -92,7 +92,7 @@ const LEARNERS: &[Learner] = &[
 ];
 
 /// The learner with these initial values.
-fn agent(task: Task, (name, params): Learner, replayed: bool, q: QTable) -> Box<dyn TabularAgent> {
+fn agent(task: Task, (name, params): Learner, replayed: bool, q: &QTable) -> Box<dyn TabularAgent> {
     let mut config = AgentConfig::new(find(name).expect("it is registered"));
     config.params.insert("gamma", ParamValue::Float(task.gamma));
     for (key, value) in params {
@@ -221,9 +221,10 @@ impl EnvVisitor for Equivalence {
             }
             let (zero, from_phi) = tables(task, &env);
             let phi = CellPotential::new(n_states, Box::new(move |cell| Ok((task.phi)(cell))));
-            let agent = |q| agent(task, *learner, replayed, q);
-            let (played, shaped) = learn(task, &env, phi, NativeReward, agent(zero));
-            let (same, initialised) = learn(task, &env, NoPotential, NativeReward, agent(from_phi));
+            let agent = |q: &QTable| agent(task, *learner, replayed, q);
+            let (played, shaped) = learn(task, &env, phi, NativeReward, agent(&zero));
+            let (same, initialised) =
+                learn(task, &env, NoPotential, NativeReward, agent(&from_phi));
             let what = format!("{} {learner:?}", task.id);
             assert!(played.len() >= 50_000, "{what}: {} steps only", played.len());
             let apart = played.iter().zip(&same).position(|(a, b)| a != b);
@@ -302,7 +303,7 @@ impl EnvVisitor for Controls {
         let Task { phi, gamma, .. } = LAKE;
         for learner in LEARNERS {
             let (zero, from_phi) = tables(LAKE, &env);
-            let agent = |q: &QTable| agent(LAKE, *learner, false, q.clone());
+            let agent = |q: &QTable| agent(LAKE, *learner, false, q);
             let (same, initialised) =
                 learn(LAKE, &env, NoPotential, NativeReward, agent(&from_phi));
             let run = |gamma, keeps_terminal| {

@@ -24,7 +24,7 @@ pub enum Backup {
     Best,
     /// The action that is played next: SARSA.
     Played,
-    /// All actions, each as likely as it is played: expected SARSA, for which Q_F(S′, A′) and
+    /// All actions, each as likely as it is played: expected SARSA, for which `Q_F(S′, A′)` and
     /// Φ(S′, A′) are expectations.
     Expected,
 }

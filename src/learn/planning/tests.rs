@@ -130,6 +130,26 @@ fn the_shortest_way_out_of_a_corridor() {
     assert_eq!(found.changes.len(), found.switched.len());
 }
 
+/// From state 0 to a loop of two states, stochastic: the second is left at once, the first with
+/// probability 1/2. An episode is in them 2/3 and 1/3 of the time.
+#[test]
+fn the_average_of_a_recurrent_set() {
+    let go = |p, to, reward| outcome(p, to, reward, false);
+    let table = [
+        vec![vec![go(0.5, 1, 9.0), outcome(0.5, 0, 0.0, true)]],
+        vec![vec![go(0.5, 1, 1.0), go(0.5, 2, 2.0)]],
+        vec![vec![go(1.0, 1, -3.0)]],
+    ];
+    let mdp = FiniteMdp::new(&table, vec![1.0, 0.0, 0.0]).unwrap();
+    let dynamics = Dynamics::new(&mdp, Over::Reachable);
+    let sets = dynamics.recurrent(Policy::Uniform);
+    assert_eq!(sets, [[1, 2]]);
+    let average = dynamics.average(&dynamics.rewards(&mdp), Policy::Uniform, &sets[0]).unwrap();
+    assert!((average - (1.5 * 2.0 - 3.0) / 3.0).abs() < 1e-15);
+    let ending = dynamics.expect(&mdp, |i| f64::from(u8::from(mdp.outcomes()[i].terminated)));
+    assert_eq!(dynamics.chances(&ending, Policy::Uniform).unwrap(), [0.5, 0.0, 0.0]);
+}
+
 /// Icy ground of 40 × 40 fields, −1 a step, out at one corner: large enough for rough evaluations
 /// first and for the Krylov method, discounted or not.
 #[test]

@@ -4,11 +4,13 @@
 //! A family of agents has a file of its own with a constant per agent, which [`AGENTS`] lists.
 
 mod control;
+mod linear;
 mod monte_carlo;
 mod planners;
 mod prediction;
 mod shared;
 
+pub use self::linear::BuildLinear;
 use super::control::{Advised, Backup};
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
@@ -94,6 +96,8 @@ pub struct AgentSpec {
     pub params: &'static [ParamSpec],
     /// How it is built.
     pub build: Build,
+    /// How it is built where values are linear in features, if it can learn such.
+    pub linear: Option<BuildLinear>,
 }
 
 impl AgentSpec {

@@ -37,6 +37,7 @@ pub(super) const MONTE_CARLO: AgentSpec = AgentSpec {
             })
         },
     },
+    linear: None,
 };
 
 pub(super) const OFF_POLICY_MONTE_CARLO: AgentSpec = AgentSpec {
@@ -51,4 +52,5 @@ pub(super) const OFF_POLICY_MONTE_CARLO: AgentSpec = AgentSpec {
             setup.stream,
         ))
     }),
+    linear: None,
 };
