@@ -258,7 +258,7 @@ impl RunUnit<'_> {
             each(row.steps);
             if let (Some(exact), Some(v)) = (&exact, agent.v()) {
                 let episode = rows.len() as u32;
-                let due = episode % spacing == 0 || episode + 1 == limits.episodes;
+                let due = episode.is_multiple_of(spacing) || episode + 1 == limits.episodes;
                 row.value_error = due.then(|| exact.error(v));
             }
             rows.push(row);

@@ -232,7 +232,7 @@ pub(super) fn read_values(bytes: &[u8], n_states: usize) -> Result<Vec<StoredVal
         let line = line.map_err(|e| e.to_string())?;
         let state = line[0].parse().ok().filter(|s| *s < n_states);
         let (v, exact) = (line[1].parse().ok(), Some(&line[2]).filter(|x| !x.is_empty()));
-        let exact = exact.map(|x| x.parse::<f64>()).transpose();
+        let exact = exact.map(str::parse::<f64>).transpose();
         match (state, v, exact) {
             (Some(state), Some(v), Ok(exact)) => values.push((state, v, exact)),
             _ => return Err(format!("line {}: no state among {n_states} with its value", i + 2)),
