@@ -16,7 +16,7 @@ use divan::{Bencher, black_box};
 use runner::env::cart_pole::CartPole;
 use runner::env::frozen_lake::{FrozenLake, Ice};
 use runner::env::mountain_car::MountainCar;
-use runner::learn::{Behaviour, Schedule};
+use runner::learn::{EpsilonGreedy, Explore, Schedule};
 use runner::mdp::Env;
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::streams::Stream;
@@ -102,7 +102,7 @@ fn parts_bins_of_four(bencher: Bencher) {
 
 #[divan::bench(args = [2, 4])]
 fn parts_epsilon_greedy(bencher: Bencher, n: usize) {
-    let mut behaviour = Behaviour::new(Schedule::constant(0.1), Stream::new(0, "agent"));
+    let mut behaviour = EpsilonGreedy::new(Schedule::constant(0.1), Stream::new(0, "agent"));
     let mut stream = Stream::new(0, "bench");
     let values: Vec<f64> = (0..1024 * n).map(|_| stream.uniform()).collect();
     let mut i = 0;

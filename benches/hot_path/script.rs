@@ -62,7 +62,7 @@ fn call_potential(bencher: Bencher) {
     let host = host(&plan);
     let callback = plan.variants[0].potential.as_ref().expect("the script has one");
     let mut phi = host.callbacks().potential(callback, &CartPole::new(false).schema());
-    bencher.bench_local(|| phi(black_box(&FIELDS)).expect("a number"));
+    bencher.bench_local(|| phi(black_box(&FIELDS), 1).expect("a number"));
 }
 
 #[divan::bench]

@@ -42,7 +42,8 @@ impl Pair {
         let k = if self.favours(&value.slope) {
             None
         } else {
-            Search { pair: self, value, policy }.run()?
+            let last = self.native.optimum.v.clone();
+            Search { pair: self, value, policy, last }.run()?
         };
         Ok(Critical { k, breaks_ties })
     }
@@ -56,7 +57,9 @@ impl Pair {
         for (place, a) in policy.iter().enumerate() {
             optimal[place * n_actions + a] = true;
         }
-        let optimum = self.problem(&self.f, Some(&optimal)).optimum(Start::Policy(policy))?;
+        let zero = vec![0.0; self.dynamics.len()];
+        let start = Start::Policy(policy, &zero);
+        let optimum = self.problem(&self.f, Some(&optimal)).optimum(start)?;
         let solved = Solved { rewards: Vec::new(), largest: self.largest_f, optimum };
         let scale = Scale::new(&solved, 0.0);
         let rows = solved.optimum.q.chunks_exact(n_actions).zip(optimal.chunks_exact(n_actions));
@@ -99,6 +102,8 @@ struct Search<'a> {
     value: Line,
     /// The policy found last, to start from.
     policy: Vec<Action>,
+    /// Its values.
+    last: Vec<f64>,
 }
 
 impl Search<'_> {
@@ -138,16 +143,16 @@ impl Search<'_> {
         let pair = self.pair;
         let native = &pair.native.rewards;
         let rewards: Vec<f64> = native.iter().zip(&pair.f).map(|(r, f)| r + k * f).collect();
-        let optimum = match pair.problem(&rewards, None).optimum(Start::Policy(&self.policy)) {
+        let start = Start::Policy(&self.policy, &self.last);
+        let optimum = match pair.problem(&rewards, None).optimum(start) {
             Ok(optimum) => optimum,
             Err(PlanError::Endless(_)) => return Ok(Beyond::Endless),
             Err(e) => return Err(e),
         };
-        self.policy = optimum.policy;
-        let other = Line {
-            at_zero: pair.value(native, &self.policy)?,
-            slope: pair.value(&pair.f, &self.policy)?,
-        };
+        (self.policy, self.last) = (optimum.policy, optimum.v);
+        let slope = pair.value(&pair.f, &self.policy)?;
+        let at_zero = self.last.iter().zip(&slope).map(|(v, slope)| v - k * slope).collect();
+        let other = Line { at_zero, slope };
         let own = &self.value;
         let (mut size, mut level) = (pair.native.largest + k * pair.largest_f, f64::INFINITY);
         for (v, slope) in own.at_zero.iter().zip(&own.slope) {

@@ -10,6 +10,7 @@
 
 use serde::Serialize;
 
+use super::strict::forest::leaving;
 use super::strict::{Difference, Finding};
 use crate::learn::planning::{Dynamics, PlanError, Policy};
 use crate::mdp::{Action, FiniteMdp};
@@ -23,11 +24,11 @@ pub struct Advantages<'a> {
     pub(super) native: Vec<f64>,
     /// For F, one per pair.
     pub(super) shaping: Vec<f64>,
-    /// V_F, one per place.
+    /// `V_F`, one per place.
     value: Vec<f64>,
-    /// The largest |r| and |V_R|, on which `native` is exact to some 1e-12.
+    /// The largest |r| and |`V_R`|, on which `native` is exact to some 1e-12.
     pub(super) native_scale: f64,
-    /// The largest |r|, |F| and |V_F|, on which `shaping` is.
+    /// The largest |r|, |F| and |`V_F`|, on which `shaping` is.
     pub(super) shaping_scale: f64,
 }
 
@@ -56,8 +57,8 @@ impl<'a> Advantages<'a> {
         let (mut native_scale, mut shaping_scale) = (largest(&native_value), largest(&value));
         for place in 0..dynamics.len() {
             let s = dynamics.state(place);
-            for i in mdp.range(s, 0).start..mdp.range(s, n_actions - 1).end {
-                let reward = mdp.outcomes()[i].reward.abs();
+            for (i, o) in leaving(mdp, s) {
+                let reward = o.reward.abs();
                 native_scale = native_scale.max(reward);
                 // F is a difference of two rewards, and no more exact than they are.
                 shaping_scale = shaping_scale.max(reward).max(f[i].abs());
@@ -106,7 +107,7 @@ pub struct Expected {
     pub state: usize,
     /// The action.
     pub action: Action,
-    /// S: the largest |r|, |F| and |V_F|.
+    /// S: the largest |r|, |F| and |`V_F`|.
     pub scale: f64,
     /// `−V_F`, the one potential that is possible, one value per state; 0 where no episode can be.
     #[serde(skip)]

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::cycle::Cycle;
 use super::gap::Scale;
 use super::pair::{Pair, Unsolved};
+use super::policy_change::{Extreme, PolicyChange};
 use crate::learn::planning::Policy;
 
 /// A loop that pays better than the task.
@@ -32,13 +33,13 @@ pub struct Hacking {
 }
 
 impl Pair {
-    /// The loop that pays better than the task, if there is one.
+    /// The loop that pays better than the task, if there is one, where `change` is what
+    /// [`Self::policy_change`] said.
     ///
     /// # Errors
     /// If a value is not finite.
-    pub fn hacking(&self) -> Result<Option<Hacking>, Unsolved> {
-        let extremes = self.extremes()?;
-        let policy = &extremes.policy;
+    pub fn hacking(&self, change: &PolicyChange) -> Result<Option<Hacking>, Unsolved> {
+        let Extreme { policy, v } = &change.extreme;
         let mut sets = self.dynamics.recurrent(Policy::Deterministic(policy));
         if sets.is_empty() {
             return Ok(None);
@@ -50,8 +51,7 @@ impl Pair {
         let real_native = Scale::new(&self.native, 0.0).real();
         sets.retain(|set| {
             let s = set[0];
-            learned[s] - learned_optimal[s] > real
-                && native_optimal[s] - extremes.worst[s] > real_native
+            learned[s] - learned_optimal[s] > real && native_optimal[s] - v[s] > real_native
         });
         let (mut likeliest, mut most) = (None, -1.0);
         for set in &sets {
@@ -73,7 +73,7 @@ impl Pair {
             reached: self.chance_to_reach(policy, &sets.concat())?,
             learned: learned[s],
             learned_optimal: learned_optimal[s],
-            native: extremes.worst[s],
+            native: v[s],
             native_optimal: native_optimal[s],
         }))
     }

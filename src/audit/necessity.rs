@@ -161,7 +161,7 @@ impl Task<'_> {
     fn prefers(&self, rewards: &[f64], from: &[Action], start: usize) -> Option<Action> {
         let problem =
             Problem { dynamics: self.dynamics, rewards, gamma: self.gamma, allowed: None };
-        let optimum = problem.optimum(Start::Policy(from)).ok()?;
+        let optimum = problem.optimum(Start::Policy(from, &vec![0.0; self.dynamics.len()])).ok()?;
         let scale = optimum.v.iter().chain(rewards).fold(0.0f64, |m, x| m.max(x.abs()));
         let row = &optimum.q[start * self.dynamics.n_actions()..][..self.dynamics.n_actions()];
         let mut order: Vec<Action> = (0..row.len()).collect();

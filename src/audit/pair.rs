@@ -110,8 +110,8 @@ impl Pair {
         let zero = vec![0.0; dynamics.len()];
         let problem = Problem { dynamics: &dynamics, rewards: &rewards, gamma, allowed: None };
         let native = problem.optimum(Start::Values(&zero))?;
-        let optimum =
-            Problem { rewards: &shaped, ..problem }.optimum(Start::Policy(&native.policy))?;
+        let optimum = Problem { rewards: &shaped, ..problem }
+            .optimum(Start::Policy(&native.policy, &native.v))?;
         let outcome = |i: usize| &mdp.outcomes()[i];
         let goal = goal(&dynamics, mdp);
         let chance = |ends: &dyn Fn(usize) -> bool| {
@@ -187,7 +187,9 @@ fn start(dynamics: &Dynamics, mdp: &FiniteMdp) -> Vec<f64> {
     let mut start: Vec<f64> = (0..dynamics.len()).map(probability).collect();
     let total: f64 = start.iter().sum();
     if total > 0.0 && total.is_finite() {
-        start.iter_mut().for_each(|p| *p /= total);
+        for p in &mut start {
+            *p /= total;
+        }
     } else {
         // Sampling falls back to state 0, which is the first place then.
         start.fill(0.0);

@@ -89,7 +89,7 @@ fn one_way(edges: &[Edge], largest: f64) -> bool {
     let positive = edges.iter().all(|e| e.f >= -small);
     let negative = edges.iter().all(|e| e.f <= small);
     let paid = |e: &&Edge| e.f.abs() > small && !e.terminated && e.from != e.to;
-    let returns = edges.iter().filter(paid).filter_map(|e| back(e));
+    let returns = edges.iter().filter(paid).filter_map(back);
     let mut seen = false;
     let unpaid = returns.map(|b| b.f.abs() <= small).all(|free| {
         seen = true;

@@ -51,9 +51,10 @@ impl Payoff {
             for &i in &component.pairs {
                 free[i] = rewards[i] == 0.0;
             }
-            return match end_components(dynamics, |i| free[i]).is_empty() {
-                true => Self::known(Sign::Negative, [low, 0.0]),
-                false => Self::known(Sign::Zero, [0.0; 2]),
+            return if end_components(dynamics, |i| free[i]).is_empty() {
+                Self::known(Sign::Negative, [low, 0.0])
+            } else {
+                Self::known(Sign::Zero, [0.0; 2])
             };
         }
         iterate(dynamics, rewards, component, low.abs().max(high))

@@ -23,7 +23,7 @@ pub struct PolicyChange {
     /// The state in which that is.
     pub worst_state: usize,
     /// No policy that is optimal for the learned reward loses more than this anywhere:
-    /// `span(A_F) / (1 − γ)`, A_F being the advantages of the added reward under the uniformly
+    /// `span(A_F) / (1 − γ)`, `A_F` being the advantages of the added reward under the uniformly
     /// random policy. `None` with γ = 1.
     pub bound: Option<f64>,
     /// The smallest difference in action value between a best action and one that is not;
@@ -34,6 +34,9 @@ pub struct PolicyChange {
     pub optimal_endings: Endings,
     /// How they end under the worst policy that is optimal for the learned reward.
     pub worst_endings: Endings,
+    /// That policy and its native values, by place.
+    #[serde(skip)]
+    pub(super) extreme: Extreme,
 }
 
 /// How episodes without a time limit end.
@@ -46,13 +49,12 @@ pub struct Endings {
     pub goal: f64,
 }
 
-/// The best and the worst of the policies that are greedy for the learned reward.
-pub(super) struct Extremes {
-    /// Their native values, by place.
-    pub(super) best: Vec<f64>,
-    pub(super) worst: Vec<f64>,
-    /// The worst policy.
+/// The worst policy that is optimal for the learned reward.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Extreme {
     pub(super) policy: Vec<Action>,
+    /// Its native values.
+    pub(super) v: Vec<f64>,
 }
 
 impl Pair {
@@ -61,44 +63,47 @@ impl Pair {
     /// # Errors
     /// If a value is not finite.
     pub fn policy_change(&self) -> Result<PolicyChange, Unsolved> {
-        let extremes = self.extremes()?;
+        let (best, extreme) = self.extremes()?;
         let v = &self.native.optimum.v;
-        let losses = v.iter().zip(&extremes.worst).map(|(v, worst)| v - worst);
+        let losses = v.iter().zip(&extreme.v).map(|(v, worst)| v - worst);
         let (place, largest_loss) = losses
             .enumerate()
             .fold((0, 0.0), |most, (i, loss)| if loss > most.1 { (i, loss) } else { most });
         Ok(PolicyChange {
             optimal: self.at_start(v),
-            best: self.at_start(&extremes.best),
-            worst: self.at_start(&extremes.worst),
+            best: self.at_start(&best),
+            worst: self.at_start(&extreme.v),
             largest_loss,
             worst_state: self.dynamics.state(place),
             bound: self.bound()?,
             smallest_gap: self.smallest_gap(),
             optimal_endings: self.endings(&self.native.optimum.policy)?,
-            worst_endings: self.endings(&extremes.policy)?,
+            worst_endings: self.endings(&extreme.policy)?,
+            extreme,
         })
     }
 
     /// Solves the native task among the actions that are greedy for the learned reward, for the
-    /// largest and for the smallest return.
-    pub(super) fn extremes(&self) -> Result<Extremes, PlanError> {
+    /// largest and for the smallest return. Returns the values of the best policy, and the worst.
+    fn extremes(&self) -> Result<(Vec<f64>, Extreme), PlanError> {
         let n_actions = self.dynamics.n_actions();
-        let learned = &self.learned.optimum;
-        let mut greedy = Scale::new(&self.learned, 0.0).tied(&learned.q, n_actions);
-        for (place, a) in learned.policy.iter().enumerate() {
+        let policy = &self.learned.optimum.policy;
+        let mut greedy = Scale::new(&self.learned, 0.0).tied(&self.learned.optimum.q, n_actions);
+        for (place, a) in policy.iter().enumerate() {
             greedy[place * n_actions + a] = true;
         }
-        let solve = |rewards: &[f64]| -> Result<Optimum, PlanError> {
-            self.problem(rewards, Some(&greedy)).optimum(Start::Policy(&learned.policy))
+        let v = self.value(&self.native.rewards, policy)?;
+        if greedy.iter().filter(|greedy| **greedy).count() == policy.len() {
+            return Ok((v.clone(), Extreme { policy: policy.clone(), v }));
+        }
+        let solve = |rewards: &[f64], v: &[f64]| -> Result<Optimum, PlanError> {
+            self.problem(rewards, Some(&greedy)).optimum(Start::Policy(policy, v))
         };
-        let losses: Vec<f64> = self.native.rewards.iter().map(|r| -r).collect();
-        let worst = solve(&losses)?;
-        Ok(Extremes {
-            best: solve(&self.native.rewards)?.v,
-            worst: worst.v.into_iter().map(|v| 0.0 - v).collect(),
-            policy: worst.policy,
-        })
+        // 0 - v, so that no 0 gets a sign.
+        let negative = |v: &[f64]| -> Vec<f64> { v.iter().map(|v| 0.0 - v).collect() };
+        let worst = solve(&negative(&self.native.rewards), &negative(&v))?;
+        let extreme = Extreme { policy: worst.policy, v: negative(&worst.v) };
+        Ok((solve(&self.native.rewards, &v)?.v, extreme))
     }
 
     fn bound(&self) -> Result<Option<f64>, PlanError> {

@@ -85,7 +85,9 @@ impl<'a> Scorer<'a> {
             (0..dynamics.len()).map(|place| mdp.initial()[dynamics.state(place)]).collect();
         let total: f64 = starts.iter().sum();
         if total > 0.0 {
-            starts.iter_mut().for_each(|p| *p /= total);
+            for p in &mut starts {
+                *p /= total;
+            }
         } else {
             // An episode then starts in state 0, which is the first place.
             starts.fill(0.0);

@@ -69,7 +69,6 @@ impl SspCheck {
             let payoff = Payoff::of(dynamics, rewards, &component);
             let states = || component.states.iter().map(|&place| dynamics.state(place)).collect();
             match payoff.sign {
-                Sign::Negative => {}
                 Sign::Positive => {
                     let cycle = best_cycle(dynamics, [rewards, native], &payoff);
                     let why = NotSsp::PayingLoop { payoff: payoff.bounds, cycle };
@@ -81,7 +80,7 @@ impl SspCheck {
                 Sign::Unclear if result == Self::Fine => {
                     result = Self::Inconclusive { component: states(), payoff: payoff.bounds };
                 }
-                Sign::Unclear => {}
+                Sign::Negative | Sign::Unclear => {}
             }
         }
         result
@@ -145,5 +144,59 @@ impl std::fmt::Display for SspCheck {
                 among(component)
             ),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::planning::Over;
+    use crate::mdp::{FiniteMdp, Outcome};
+
+    /// Two states: each leads to the other by action 0, for the rewards given; action 1 may end.
+    fn check(rewards: [f64; 2], ends: bool) -> SspCheck {
+        let go = |probability, next_state, reward, terminated| Outcome {
+            probability,
+            next_state,
+            reward,
+            terminated,
+        };
+        let row = |other, reward| {
+            let away = vec![go(0.5, other, reward, false), go(0.5, other, reward, false)];
+            vec![away, vec![go(0.5, other, -9.0, false), go(0.5, other, -9.0, ends)]]
+        };
+        let table = [row(1, rewards[0]), row(0, rewards[1])];
+        let mdp = FiniteMdp::new(&table, vec![1.0, 0.0]).unwrap();
+        let dynamics = Dynamics::new(&mdp, Over::Reachable);
+        let rewards = dynamics.rewards(&mdp);
+        SspCheck::new(&dynamics, &rewards, &rewards)
+    }
+
+    #[test]
+    fn what_a_round_brings_decides() {
+        assert_eq!(check([-1.0, -1.0], true), SspCheck::Fine);
+        assert_eq!(check([3.0, -3.1], true), SspCheck::Fine);
+        let lost = check([-1.0, -1.0], false);
+        assert!(
+            matches!(&lost, SspCheck::NotSsp { why: NotSsp::NoEnd, component } if *component == [0])
+        );
+        assert!(lost.to_string().contains("from state 0 no policy is sure to end the episode"));
+        let free = check([0.0, 0.0], true);
+        assert!(matches!(&free, SspCheck::NotSsp { why: NotSsp::FreeLoop, .. }));
+        assert!(free.to_string().contains("between states 0 and 1 for ever and lose nothing"));
+        let SspCheck::NotSsp { why: NotSsp::PayingLoop { payoff, cycle }, .. } =
+            check([3.5, -3.0], true)
+        else {
+            panic!("it pays 1/4 a step")
+        };
+        assert!((payoff[0] - 0.25).abs() < 1e-9 && (payoff[1] - 0.25).abs() < 1e-9);
+        let cycle = cycle.unwrap();
+        assert_eq!(
+            (&cycle.states[..], &cycle.actions[..], cycle.gain),
+            (&[0, 1][..], &[0, 0][..], 0.5)
+        );
+        // Nothing but rounding can tell 0.3 - 0.1 - 0.2 from 0.
+        let close = check([0.3, -(0.1 + 0.2)], true);
+        assert!(matches!(close, SspCheck::Inconclusive { .. }), "{close:?}");
     }
 }

@@ -110,6 +110,11 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
                 rows.push(("discretiser", format!("{} bins = {cells} cells", sizes.join(" × "))));
             }
         }
+        DiscretiserSpec::Features(features) => {
+            let n_actions = v.environment().map_or(0, |env| env.schema().actions.len());
+            let weights = features.n_features().unwrap_or(0) * n_actions;
+            rows.push(("discretiser", format!("{features}, {weights} weights")));
+        }
         DiscretiserSpec::Cells { shape, cell } => {
             let cells: usize = shape.iter().product();
             rows.push(("discretiser", format!("{}, {cells} cells", at(cell))));
@@ -129,6 +134,10 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     if let Some(potential) = &v.potential {
         let on = match (&v.discretiser, v.potential_on) {
             (DiscretiserSpec::StateIndex, _) => "tabulated over the states",
+            (DiscretiserSpec::Features(_), _) => {
+                "on the state itself, interpreted at every step: keeps the optimal policy, \
+                 equals no initial values"
+            }
             (_, PhiOn::Cell) => "once per cell, on its representative",
             (_, PhiOn::Raw) => "on the raw state, interpreted at every step",
         };

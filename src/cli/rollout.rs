@@ -10,7 +10,7 @@ use super::{Failure, Outcome};
 use crate::env::rollout::{Event, Length, drive, parse_actions, random_policy};
 use crate::env::{PlayedAction, Session, find_with_note};
 use crate::experiment::play::{Policy, play};
-use crate::experiment::read_table;
+use crate::experiment::{holds_weights, read_table, read_weights};
 use crate::mdp::numpy::Seed;
 use crate::mdp::streams::Stream;
 
@@ -28,7 +28,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "A,B,..", conflicts_with = "policy", allow_hyphen_values = true)]
     actions: Option<String>,
     /// Who plays if no actions are given: `random` for uniformly random actions from the seed, or
-    /// the policy.csv of a unit, if the environment is finite
+    /// the policy.csv of a unit, if the environment is finite, or its weights.csv
     #[arg(long, value_name = "random|FILE", default_value = "random")]
     policy: String,
     /// Number of steps that the policy plays
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut policy = match actions {
         Some(_) => None,
         None if args.policy == "random" => None,
-        None => Some(table_policy(&session, Path::new(&args.policy))?),
+        None => Some(stored_policy(&session, Path::new(&args.policy))?),
     };
     let mut view = View::open(&args.view, &session)?;
     let steps = actions.as_ref().map_or(args.steps, Vec::len);
@@ -84,15 +84,23 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Fine)
 }
 
-/// The greedy policy of a `policy.csv`. Its rows are states only where the environment is finite:
-/// elsewhere they are cells of a discretiser, which the file does not tell.
-fn table_policy(session: &Session, path: &Path) -> Result<Policy, Failure> {
+/// The greedy policy of a `weights.csv`, or of a `policy.csv`. The rows of the latter are states only
+/// where the environment is finite: elsewhere they are cells of a discretiser, which the file does
+/// not tell.
+fn stored_policy(session: &Session, path: &Path) -> Result<Policy, Failure> {
     let id = session.spec().id;
     if !path.exists() {
         return Err(Failure::Message(
             format!("--policy: there is no file `{}`", path.display()),
-            Some("give `random`, or the policy.csv of a unit of a results folder".into()),
+            Some(
+                "give `random`, or the policy.csv or weights.csv of a unit of a results folder"
+                    .into(),
+            ),
         ));
+    }
+    if holds_weights(path) {
+        let (q, frame_skip) = read_weights(path, session.schema())?;
+        return Ok(Policy::of_weights(q, frame_skip));
     }
     let Some(n_states) = session.n_states() else {
         return Err(Failure::Message(

@@ -3,15 +3,15 @@
 use super::predict::{Exact, given_policy};
 use super::shaped::{learner, potential};
 use super::shielded::playable;
-use crate::learn::AnyAgent;
 use crate::learn::planning::{PlannedAgent, Sweep};
 use crate::learn::registry::{Build, Setup};
+use crate::learn::{AnyAgent, Learn, LinearSetup};
 use crate::mdp::streams::Stream;
 use crate::mdp::{Env, FiniteMdp, Schema};
 use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, Variant};
 use crate::shaping::{
-    AnyReward, Bins, Fault, MAX_FIELDS, NativeReward, Potential, RewardModel, ScriptedReward,
-    Shield, TabulatedReward, Transition, shaped_model,
+    AnyReward, Bins, Fault, FeatureSpec, Features, Fields, MAX_FIELDS, NativeReward, Potential,
+    RewardModel, ScriptedReward, Shield, TabulatedReward, Transition, shaped_model,
 };
 
 /// A state with every field in the middle of its range (0 where that is unbounded): the values of
@@ -28,8 +28,8 @@ pub(super) fn middle(schema: &Schema) -> [f64; MAX_FIELDS] {
 /// From a cell to the fields of the state that stands for it.
 pub(super) type Representative = Box<dyn Fn(usize) -> [f64; MAX_FIELDS]>;
 
-/// The state that stands for each cell: itself, or the centre of the bins. Scripted cells have
-/// none.
+/// The state that stands for each cell: itself, or the centre of the bins. Scripted cells and
+/// features have none.
 pub(super) fn representative<E: Env + Clone + 'static>(
     variant: &Variant,
     env: &E,
@@ -53,7 +53,7 @@ pub(super) fn representative<E: Env + Clone + 'static>(
                 fields
             }))
         }
-        DiscretiserSpec::Cells { .. } => None,
+        DiscretiserSpec::Cells { .. } | DiscretiserSpec::Features(_) => None,
     }
 }
 
@@ -305,7 +305,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
     match variant.agent.spec.build {
         Build::Learner(build)
         | Build::Predictor(build)
-        | Build::OnPolicy(build)
+        | Build::OnPolicy { build, .. }
         | Build::OneStep { build, .. } => {
             let function = |name: &str| variant.agent_functions.get(name);
             let initial_q = function("initial_q")
@@ -339,4 +339,17 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             Ok(Assembled { agent, sweeps, exact: None })
         }
     }
+}
+
+/// The variant's agent for one seed, where its values are linear in features.
+pub(super) fn linear_agent<E: Env>(
+    variant: &Variant,
+    features: &FeatureSpec,
+    env: &E,
+    seed: u64,
+) -> Box<dyn Learn<Fields>> {
+    let build = variant.agent.spec.linear.expect("checked when the plan was resolved");
+    let features = Features::new(features).expect("checked when the plan was resolved");
+    let stream = Stream::new(seed, "agent");
+    build(&variant.agent, LinearSetup { features, n_actions: env.n_actions(), stream })
 }

@@ -6,15 +6,17 @@ use std::sync::atomic::AtomicBool;
 
 use sha2::{Digest, Sha256};
 
+use super::assemble::middle;
 use super::audit::{Audit, audit_variant};
 use super::hex;
+use super::landscape::features;
 use super::record::{StateValues, UnitRecord};
 use super::unit::{UnitError, run_unit};
 use crate::env::EnvVisitor;
-use crate::learn::{QTable, greedy_sets};
+use crate::learn::{LinearQ, QTable, greedy_sets};
 use crate::mdp::{Env, Grid, Schema};
 use crate::script::{Diagnostic, DiscretiserSpec, Host, Plan, SeedList, Variant};
-use crate::shaping::Dim;
+use crate::shaping::{Bins, Dim};
 use crate::stats::rolling_mean;
 
 /// What a golden run plays at most, unless the script says otherwise.
@@ -51,6 +53,9 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         writeln!(out, "  {line}").expect(MEMORY);
     }
     writeln!(out, "  agent {}({})", variant.agent.spec.name, params.join(", ")).expect(MEMORY);
+    if let DiscretiserSpec::Features(features) = &variant.discretiser {
+        writeln!(out, "  features {features}").expect(MEMORY);
+    }
     let audit = audit_variant(host, variant, None)?;
     exact(&audit, out);
     let look = look(variant)?;
@@ -62,6 +67,9 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         };
         writeln!(out, "  seed {seed}").expect(MEMORY);
         returns(variant, &record, out);
+        if let (Some(weights), Some(features)) = (&record.weights, features(variant)) {
+            linear(&LinearQ::from_weights(features, weights.clone()), variant, &look, i == 0, out);
+        }
         if let Some(values) = &record.values {
             state_values(&record, values, out);
         }
@@ -137,6 +145,29 @@ fn look(variant: &Variant) -> Result<Look, Diagnostic> {
     }
     let env = variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
     Ok(Look { schema: env.visit(Ask) })
+}
+
+/// Places of the lattice on which linear values are pinned down, by the number of their fields.
+const LATTICE: [usize; 7] = [1, 64, 40, 12, 8, 5, 4];
+
+/// The greedy actions of linear values at the centres of a lattice of bins over the fields' ranges.
+fn linear(values: &LinearQ, variant: &Variant, look: &Look, draw: bool, out: &mut String) {
+    let DiscretiserSpec::Features(spec) = &variant.discretiser else { return };
+    let n = LATTICE.get(spec.dims.len()).copied().unwrap_or(2);
+    let dims: Vec<Dim> = spec.dims.iter().map(|d| Dim { n, ..*d }).collect();
+    let bins = Bins::new(&dims).expect("the ranges have been checked");
+    let state = |cell: usize| {
+        let mut fields = middle(&look.schema).to_vec();
+        bins.centre(cell, &mut fields);
+        fields
+    };
+    let states: Vec<Vec<f64>> = (0..bins.n_cells()).map(state).collect();
+    let q = values.table(&states);
+    let sets = greedy_sets(&q);
+    writeln!(out, "    greedy sets {} of {} places", digest(&sets), sets.len()).expect(MEMORY);
+    if draw {
+        draw_bins(&dims, &look.schema, &q, &sets, out);
+    }
 }
 
 /// Whether nothing was learned in `cell` that would prefer an action.

@@ -4,9 +4,10 @@
 use super::assemble::{diagnostic_of, middle};
 use super::shaped;
 use crate::env::{EnvVisitor, Session};
+use crate::learn::{LinearQ, QTable};
 use crate::mdp::{Env, MAX_FIELDS, Schema};
 use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
-use crate::shaping::{Bins, CellFn, Fault, PhiFn};
+use crate::shaping::{Active, Bins, CellFn, Fault, Features, PhiFn};
 
 /// From a state to the row of the table that stands for it.
 pub(super) enum Locate {
@@ -19,25 +20,83 @@ pub(super) enum Locate {
 }
 
 impl Locate {
-    pub(super) fn new(host: &Host, variant: &Variant, schema: &Schema) -> Self {
-        match &variant.discretiser {
+    /// `None` where values are linear in features: there is no table.
+    fn new(host: &Host, variant: &Variant, schema: &Schema) -> Option<Self> {
+        Some(match &variant.discretiser {
             DiscretiserSpec::StateIndex => Self::Index,
             DiscretiserSpec::Bins(dims) => {
                 Self::Bins(Bins::new(dims).expect("checked when the plan was resolved"))
             }
+            DiscretiserSpec::Features(_) => return None,
             DiscretiserSpec::Cells { shape, cell } => {
                 Self::Cells(host.callbacks().cells(cell, shape, &variant.normalise, schema))
             }
-        }
+        })
     }
 
     /// The row of the session's present state.
-    pub(super) fn present(&mut self, session: &Session) -> Result<usize, Fault> {
+    fn present(&mut self, session: &Session) -> Result<usize, Fault> {
         match self {
             Self::Index => Ok(session.state_index().expect("only for finite environments")),
             Self::Bins(bins) => Ok(bins.index(session.fields())),
             Self::Cells(cell) => cell(session.fields()),
         }
+    }
+}
+
+/// Action values as they were learned, to be asked of a session's present state.
+pub(super) enum Lookup {
+    /// A table.
+    Table(Locate, QTable),
+    /// Features and weights.
+    Linear {
+        /// Both of them.
+        q: LinearQ,
+        /// The present state's features.
+        active: Active,
+        /// Its values.
+        row: Vec<f64>,
+    },
+}
+
+impl Lookup {
+    /// Those of `variant`, whose table or weights `q` holds.
+    pub(super) fn new(host: &Host, variant: &Variant, schema: &Schema, q: QTable) -> Self {
+        match Locate::new(host, variant, schema) {
+            Some(locate) => Self::Table(locate, q),
+            None => Self::linear(LinearQ::from_weights(
+                features(variant).expect("without a table there are features"),
+                q,
+            )),
+        }
+    }
+
+    /// Linear ones.
+    pub(super) fn linear(q: LinearQ) -> Self {
+        let (active, row) = (q.features().active(), vec![0.0; q.weights().n_actions()]);
+        Self::Linear { q, active, row }
+    }
+
+    /// One value per action.
+    pub(super) fn present(&mut self, session: &Session) -> Result<&[f64], Fault> {
+        match self {
+            Self::Table(locate, q) => Ok(q.row(locate.present(session)?)),
+            Self::Linear { q, active, row } => {
+                q.features().see(session.fields(), active);
+                q.values(active, row);
+                Ok(row)
+            }
+        }
+    }
+}
+
+/// The features that a variant's values are linear in.
+pub(super) fn features(variant: &Variant) -> Option<Features> {
+    match &variant.discretiser {
+        DiscretiserSpec::Features(spec) => {
+            Some(Features::new(spec).expect("checked when the plan was resolved"))
+        }
+        _ => None,
     }
 }
 
@@ -56,7 +115,9 @@ pub struct Landscape {
     pub schema: Schema,
     /// Every state by its index, on environments whose table goes by it.
     pub states: Option<Vec<ListedState>>,
-    locate: Locate,
+    /// The features, where there is no table.
+    pub features: Option<Features>,
+    locate: Option<Locate>,
     phi: Option<PhiFn>,
     /// In which episode Φ is taken.
     last_episode: u32,
@@ -78,8 +139,9 @@ impl Landscape {
         let phi = shaped::phi(host, variant, &schema);
         Ok(Self {
             states: by_index.then(|| env.visit(ListStates)),
-            on_cell: matches!(locate, Locate::Bins(_)) && variant.potential_on == PhiOn::Cell,
+            on_cell: matches!(locate, Some(Locate::Bins(_))) && variant.potential_on == PhiOn::Cell,
             schema,
+            features: features(variant),
             locate,
             phi,
             last_episode: variant.episodes,
@@ -92,15 +154,15 @@ impl Landscape {
     }
 
     /// The row of the table for a state with these fields; `None` where states have indices of
-    /// their own (see [`Self::states`]).
+    /// their own (see [`Self::states`]), and where there is no table.
     ///
     /// # Errors
     /// If a scripted discretiser fails.
     pub fn cell(&mut self, fields: &[f64]) -> Result<Option<usize>, Diagnostic> {
         match &mut self.locate {
-            Locate::Index => Ok(None),
-            Locate::Bins(bins) => Ok(Some(bins.index(fields))),
-            Locate::Cells(cell) => cell(fields).map(Some).map_err(diagnostic_of),
+            None | Some(Locate::Index) => Ok(None),
+            Some(Locate::Bins(bins)) => Ok(Some(bins.index(fields))),
+            Some(Locate::Cells(cell)) => cell(fields).map(Some).map_err(diagnostic_of),
         }
     }
 
@@ -114,7 +176,7 @@ impl Landscape {
         let mut state = [0.0; MAX_FIELDS];
         let n_fields = self.schema.fields.len();
         match &self.locate {
-            Locate::Bins(bins) if self.on_cell => {
+            Some(Locate::Bins(bins)) if self.on_cell => {
                 state = middle(&self.schema);
                 bins.centre(cell, &mut state);
             }

@@ -6,19 +6,18 @@
 //! action is played, which is what greedy choice did in training too. An action is repeated for as
 //! many steps as the variant's `frame_skip` says.
 
-use super::landscape::Locate;
+use super::landscape::{Locate, Lookup};
 use crate::env::rollout::{Event, Length, RolloutError, drive};
 use crate::env::{EnvError, PlayedAction, Session};
-use crate::learn::{QTable, argmax_allowed};
+use crate::learn::{LinearQ, QTable, argmax_allowed};
 use crate::mdp::numpy::Seed;
 use crate::mdp::{Action, Ending};
 use crate::script::{Host, Variant};
 use crate::shaping::{ActionSet, Fault, ShieldFn, Shielded};
 
-/// A greedy policy over a table.
+/// A greedy policy.
 pub struct Policy {
-    locate: Locate,
-    q: QTable,
+    values: Lookup,
     shield: Option<ShieldFn>,
     /// For how many steps an action is played.
     frame_skip: u32,
@@ -27,19 +26,26 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// The policy of `variant` that is greedy with respect to `q`, a table of its units.
+    /// The policy of `variant` that is greedy with respect to `q`, the table (or the weights) of
+    /// one of its units.
     pub fn new(host: &Host, variant: &Variant, session: &Session, q: QTable) -> Self {
-        let locate = Locate::new(host, variant, session.schema());
         let shield = variant
             .allowed
             .as_ref()
             .map(|allowed| host.callbacks().shield(allowed, q.n_actions(), session.schema()));
-        Self { locate, q, shield, frame_skip: variant.frame_skip, held: 0 }
+        let values = Lookup::new(host, variant, session.schema(), q);
+        Self { values, shield, frame_skip: variant.frame_skip, held: 0 }
     }
 
     /// The policy of a table that has one row per state of a finite environment.
     pub fn of_states(q: QTable) -> Self {
-        Self { locate: Locate::Index, q, shield: None, frame_skip: 1, held: 0 }
+        let values = Lookup::Table(Locate::Index, q);
+        Self { values, shield: None, frame_skip: 1, held: 0 }
+    }
+
+    /// The policy of values that are linear in features; an action is played for `frame_skip` steps.
+    pub fn of_weights(q: LinearQ, frame_skip: u32) -> Self {
+        Self { values: Lookup::linear(q), shield: None, frame_skip, held: 0 }
     }
 
     /// The action for the session's present state.
@@ -49,12 +55,12 @@ impl Policy {
     pub fn action(&mut self, session: &Session) -> Result<PlayedAction, RolloutError> {
         if session.elapsed().is_multiple_of(self.frame_skip) {
             let failed = |f: Fault| RolloutError::Policy(f.0);
-            let cell = self.locate.present(session).map_err(failed)?;
             let allowed = match &mut self.shield {
                 Some(shield) => shield(session.fields()).map_err(failed)?,
                 None => ActionSet::ALL,
             };
-            self.held = argmax_allowed(self.q.row(cell), Shielded { cell, allowed });
+            let row = self.values.present(session).map_err(failed)?;
+            self.held = argmax_allowed(row, Shielded { cell: 0, allowed });
         }
         Ok(session.action(self.held))
     }

@@ -1,8 +1,9 @@
 //! What a unit leaves behind.
 
-use crate::learn::QTable;
 use crate::learn::planning::Sweep;
+use crate::learn::{LinearQ, QTable};
 use crate::mdp::Ending;
+use crate::shaping::Features;
 
 /// One episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +35,9 @@ pub struct UnitRecord {
     pub rows: Vec<EpisodeRow>,
     /// The action values learned, if the agent keeps any.
     pub q: Option<QTable>,
+    /// The weights learned, shape `[n_features, n_actions]`, if the agent's values are linear in
+    /// features.
+    pub weights: Option<QTable>,
     /// The state values learned, if they are what the agent learns.
     pub values: Option<StateValues>,
     /// How a planner came to its solution; empty for learners.
@@ -76,13 +80,31 @@ impl Values {
     }
 }
 
-/// What was learned, read back from a store.
+/// What was learned, read back from a store: of states, or where values are linear in features, of
+/// these: their weights then stand in for action values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     /// The values; the agent's initial one where nothing was learned.
     pub values: Values,
-    /// Whether anything was learned in a state, one flag each.
+    /// Whether anything was learned in a state (or of a feature), one flag each.
     pub experienced: Vec<bool>,
+}
+
+impl Learned {
+    /// Of weights of `features`: the values at `states`, a row each. Something was learned where it
+    /// was of one of the state's features.
+    #[must_use]
+    pub fn at(self, features: &Features, states: &[Vec<f64>]) -> Self {
+        let Self { values: Values::Q(weights), experienced } = self else { return self };
+        let mut active = features.active();
+        let mut known = |state: &Vec<f64>| {
+            features.see(state, &mut active);
+            active.index.iter().any(|&i| experienced[i as usize])
+        };
+        let experienced = states.iter().map(&mut known).collect();
+        let q = LinearQ::from_weights(features.clone(), weights).table(states);
+        Self { values: Values::Q(q), experienced }
+    }
 }
 
 impl UnitRecord {

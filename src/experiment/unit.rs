@@ -17,8 +17,9 @@ use crate::mdp::Env;
 use crate::mdp::numpy::NumpyRng;
 use crate::script::{Diagnostic, DiscretiserSpec, Host, Plan, Variant};
 use crate::shaping::{
-    AnyCells, AnyPotential, AnyReward, Bins, Discretiser, Fault, NativeReward, NoPotential,
-    Potential, RewardModel, ScriptedCells, ShieldedCells, StateIndex,
+    AnyCells, AnyPotential, AnyReward, Bins, Discretiser, Fault, FeatureSpec, NativeReward,
+    NoPotential, Potential, RawFields, RewardModel, ScriptedCells, Shield, ShieldedCells,
+    StateIndex,
 };
 
 /// Raised whenever the same configuration gives other results than before: old units are then not
@@ -146,6 +147,7 @@ impl EnvVisitor for RunUnit<'_> {
                 }
                 AnyCells::Bins(bins)
             }
+            DiscretiserSpec::Features(features) => return self.linear(env, features, shield),
             DiscretiserSpec::Cells { shape, cell } => {
                 let schema = env.schema();
                 let cell = host.callbacks().cells(cell, shape, &variant.normalise, &schema);
@@ -228,6 +230,23 @@ impl RunUnit<'_> {
         self.train(World { env, discretiser, potential, reward }, agent.boxed(), extra)
     }
 
+    /// One loop for every agent on linear values, potential and reward.
+    fn linear<E: Env + Clone + 'static>(
+        self,
+        env: E,
+        features: &FeatureSpec,
+        shield: Option<Shield>,
+    ) -> Result<UnitRecord, UnitError> {
+        let (host, variant, seed) = (self.host, self.variant, self.seed);
+        let fault = |f| UnitError::fault(variant, seed, f);
+        let potential = shaped::potential(host, variant, &env, 1).map_err(fault)?;
+        let reward = assemble::reward(host, variant, &env).map_err(fault)?;
+        let agent = assemble::linear_agent(variant, features, &env, seed);
+        let discretiser = RawFields { shield };
+        let extra = Extra { sweeps: Vec::new(), exact: None };
+        self.train(World { env, discretiser, potential, reward }, agent, extra)
+    }
+
     fn train<E, D, P, R, A>(
         self,
         mut world: World<E, D, P, R>,
@@ -264,12 +283,13 @@ impl RunUnit<'_> {
             rows.push(row);
         })
         .map_err(|e| UnitError::train(variant, seed, e))?;
+        let weights = agent.weights().cloned();
         let q = agent.q().cloned();
         let values = agent.v().filter(|_| q.is_none()).map(|v| StateValues {
             v: v.to_vec(),
             exact: exact.map_or_else(Vec::new, |exact| exact.v),
         });
-        Ok(UnitRecord { rows, q, values, sweeps })
+        Ok(UnitRecord { rows, q, weights, values, sweeps })
     }
 }
 

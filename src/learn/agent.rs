@@ -28,6 +28,12 @@ pub trait Agent {
     /// The action values learned so far, if the agent keeps any.
     fn q(&self) -> Option<&QTable>;
 
+    /// The weights learned so far, shape `[n_features, n_actions]`, if the agent's action values are
+    /// linear in features.
+    fn weights(&self) -> Option<&QTable> {
+        None
+    }
+
     /// The state values learned so far, one per state, if that is what the agent learns.
     fn v(&self) -> Option<&[f64]> {
         None
@@ -75,6 +81,10 @@ impl<T: Agent + ?Sized> Agent for Box<T> {
 
     fn q(&self) -> Option<&QTable> {
         (**self).q()
+    }
+
+    fn weights(&self) -> Option<&QTable> {
+        (**self).weights()
     }
 
     fn v(&self) -> Option<&[f64]> {

@@ -2,6 +2,7 @@
 //!
 //! - [`Agent`], [`Learn`]: chooses actions and learns from rewards
 //! - [`control`]: agents that learn a table of action values step by step; [`RandomAgent`]
+//! - [`linear`]: agents whose action values are linear in features
 //! - [`MonteCarlo`], [`OffPolicyMonteCarlo`]: from the returns of whole episodes
 //! - [`prediction`]: the state values of a policy that is given
 //! - [`planning`]: value iteration, policy iteration, exact policy evaluation on a [`FiniteMdp`]
@@ -21,6 +22,7 @@ mod bootstrapped;
 pub mod control;
 mod episode;
 mod greedy;
+pub mod linear;
 mod look_back;
 mod monte_carlo;
 mod off_policy_monte_carlo;
@@ -41,6 +43,7 @@ pub use bootstrapped::{Bootstrapped, stability_bound};
 pub use control::{QLearning, Sarsa, td_error};
 pub use episode::Visits;
 pub use greedy::{argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed};
+pub use linear::{LinearLearner, LinearQ, LinearSetup};
 pub use look_back::LookBack;
 pub use monte_carlo::MonteCarlo;
 pub use off_policy_monte_carlo::OffPolicyMonteCarlo;

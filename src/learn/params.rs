@@ -139,9 +139,9 @@ impl ParamKind {
             }
             (Self::Int { min }, ParamValue::Int(n)) => (n >= min).then_some(value),
             (Self::StepSize, ParamValue::VisitCount { .. })
-            | (Self::Exploration, ParamValue::Exploration(_)) => Some(value),
+            | (Self::Exploration, ParamValue::Exploration(_))
+            | (Self::Bool, ParamValue::Bool(_)) => Some(value),
             (Self::StepSize, _) => Self::Rate { open: true }.accept(value),
-            (Self::Bool, ParamValue::Bool(_)) => Some(value),
             (Self::Bool | Self::Word(_) | Self::Int { .. } | Self::Exploration, _) => None,
             (Self::Rate { open }, _) => {
                 let schedule = match value {

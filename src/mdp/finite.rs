@@ -195,3 +195,34 @@ impl FiniteMdp {
         shaped
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flat_parts_are_the_nested_table_and_wrong_ones_are_refused() {
+        let go =
+            |next_state| Outcome { probability: 0.5, next_state, reward: 1.0, terminated: false };
+        let table = [vec![vec![go(0), go(1)], vec![go(1)]], vec![vec![go(1)], vec![go(0)]]];
+        let outcomes = vec![go(0), go(1), go(1), go(1), go(0)];
+        let flat = |n, offsets: &[u32], outcomes: &[Outcome], initial: &[f64]| {
+            FiniteMdp::from_parts(n, offsets.to_vec(), outcomes.to_vec(), initial.to_vec())
+        };
+        let same = flat(2, &[0, 2, 3, 4, 5], &outcomes, &[1.0, 0.0]).unwrap();
+        assert_eq!(same, FiniteMdp::new(&table, vec![1.0, 0.0]).unwrap());
+        let far = [go(0), go(1), go(1), go(2), go(0)];
+        for (n, offsets, outcomes, initial, expected) in [
+            (0, &[0, 5][..], &outcomes[..], &[1.0][..], "at least one state and one action"),
+            (2, &[0, 2, 3, 5], &outcomes, &[1.0], "3 lists of outcomes for 2 actions per state"),
+            (2, &[0, 2, 3, 4, 5], &outcomes, &[1.0], "1 initial probabilities for 2 states"),
+            (2, &[0, 2, 3, 4, 4], &outcomes, &[1.0, 0.0], "from 0 to 4, there are 5 outcomes"),
+            (2, &[0, 2, 2, 4, 5], &outcomes, &[1.0, 0.0], "no outcome for action 1 in state 0"),
+            (2, &[0, 9, 3, 4, 5], &outcomes, &[1.0, 0.0], "no outcome for action 1 in state 0"),
+            (2, &[0, 2, 3, 4, 5], &far, &[1.0, 0.0], "action 0 in state 1 leads to state 2"),
+        ] {
+            let error = flat(n, offsets, outcomes, initial).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

@@ -207,15 +207,16 @@ fn acting(states: &[ListedState]) -> Vec<&ListedState> {
     states.iter().filter(|s| s.acts).collect()
 }
 
-/// The fields that tell states apart: the binned ones; on finite environments the first whole
+/// The fields that tell states apart: those with bins or features; on finite environments the first whole
 /// numbers that do (a state's index does too, but says nothing); else all.
 fn telling(landscape: &Landscape, variant: &Variant) -> Vec<usize> {
     let fields = &landscape.schema.fields;
-    let states = match (&variant.discretiser, &landscape.states) {
-        (DiscretiserSpec::Bins(dims), _) => return dims.iter().map(|d| d.field).collect(),
-        (_, Some(states)) => states,
-        _ => return (0..fields.len()).collect(),
-    };
+    let cut: Vec<usize> =
+        (0..fields.len()).filter(|&f| variant.discretiser.dim(f).is_some()).collect();
+    if !cut.is_empty() {
+        return cut;
+    }
+    let Some(states) = &landscape.states else { return (0..fields.len()).collect() };
     if landscape.schema.grid.is_some() {
         let place = |name| fields.iter().position(|f| f.name == name);
         return [place("row"), place("col")].into_iter().flatten().collect();
@@ -344,9 +345,9 @@ impl Choice<'_> {
     /// Where fields stand that nobody chose: in the middle of their bins, or of their range.
     fn middle(&self) -> Vec<f64> {
         let mut fields = self.landscape.middle();
-        if let DiscretiserSpec::Bins(dims) = &self.variant.discretiser {
-            for d in dims {
-                fields[d.field] = f64::midpoint(d.lo, d.hi);
+        for (f, value) in fields.iter_mut().enumerate() {
+            if let Some(d) = self.variant.discretiser.dim(f) {
+                *value = f64::midpoint(d.lo, d.hi);
             }
         }
         fields
@@ -365,7 +366,9 @@ impl Choice<'_> {
             return Ok((self.axis(self.field(x)?)?, self.axis(self.field(y)?)?));
         }
         let mut axes: Vec<Axis> = self.telling.iter().filter_map(|&f| self.axis(f).ok()).collect();
-        axes.sort_by_key(|axis| std::cmp::Reverse(axis.n));
+        // Of axes with as many places, those of fields that are cut most finely.
+        let parts = |field| self.variant.discretiser.dim(field).map_or(0, |d| d.n);
+        axes.sort_by_key(|axis| std::cmp::Reverse((axis.n, parts(axis.field))));
         axes.truncate(2);
         axes.sort_by_key(|axis| (axis.down, axis.n, axis.field));
         let mut axes = axes.into_iter();
@@ -391,8 +394,9 @@ impl Choice<'_> {
         // A map is drawn whole; elsewhere what no episode meets is left out.
         let own = self.values(field);
         let is_map = self.landscape.schema.grid.is_some();
-        let (low, high) = match (own.first(), own.last()) {
-            (Some(&low), Some(&high)) if !is_map => (low, high),
+        let (low, high) = match (own.first(), own.last(), self.variant.discretiser.dim(field)) {
+            (Some(&low), Some(&high), _) if !is_map => (low, high),
+            (_, _, Some(d)) if kind == FieldKind::Float => (d.lo, d.hi),
             _ => (low, high),
         };
         if !(low.is_finite() && high.is_finite()) || kind == FieldKind::Letter {

@@ -14,6 +14,7 @@ use crate::experiment::{Landscape, Learned, Values};
 use crate::learn::{argmax_tol, greedy_set};
 use crate::mdp::{Action, Grid};
 use crate::script::{Host, Variant};
+use crate::shaping::Features;
 
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +113,15 @@ impl Tables {
         }
     }
 
+    /// Of weights of `features`: tables with a row for each place of `frame`, in the order in which
+    /// these are drawn.
+    fn at_places(&self, features: &Features, frame: &Frame) -> Self {
+        let places = (0..frame.y.n).flat_map(|j| (0..frame.x.n).map(move |i| (i, j)));
+        let states: Vec<Vec<f64>> = places.map(|(i, j)| frame.fields(i, j)).collect();
+        let learned = self.learned.iter().map(|one| one.clone().at(features, &states));
+        Self { learned: learned.collect(), seeds: self.seeds.clone() }
+    }
+
     /// The mean over the seeds that know a cell of their largest value there.
     fn value(&self, cell: usize) -> Option<f64> {
         let own = self.learned.iter().filter(|l| l.experienced[cell]);
@@ -157,12 +167,19 @@ pub fn pictures(
     let mut landscape = Landscape::new(host, variant)?;
     let mut pictures = Vec::new();
     let n_cells = tables.learned.first().map_or(0, |one| one.experienced.len());
-    let learned: Vec<usize> =
+    let mut learned: Vec<usize> =
         (0..n_cells).filter(|&c| tables.learned.iter().any(|one| one.experienced[c])).collect();
+    if landscape.features.is_some() {
+        // Rows are features, which stand nowhere.
+        learned.clear();
+    }
+    let features = landscape.features.clone();
     let own = variant.shaping.learned.unwrap_or(0.0);
     let has_potential = has_potential(variant);
     for frame in frames(&landscape, variant, request, &learned)? {
         let cells = spots(&mut landscape, &frame)?;
+        let at_places = features.as_ref().map(|features| tables.at_places(features, &frame));
+        let tables = at_places.as_ref().unwrap_or(tables);
         for &quantity in quantities {
             if quantity == Quantity::Potential && !has_potential {
                 continue;
@@ -208,7 +225,8 @@ pub fn pictures(
     Ok(pictures)
 }
 
-/// The row of the table at a place, and Φ there; `None` where no episode can be and act.
+/// The row of the table at a place, and Φ there; `None` where no episode can be and act. Without a
+/// table the place's own number stands for the row (see [`Tables::at_places`]).
 type Spot = Option<(usize, Option<f64>)>;
 
 fn spots(landscape: &mut Landscape, frame: &Frame) -> Result<Vec<Spot>, StoredError> {
@@ -218,7 +236,11 @@ fn spots(landscape: &mut Landscape, frame: &Frame) -> Result<Vec<Spot>, StoredEr
             frame.listed(states, i, j).map(|cell| (cell, states[cell].fields.clone()))
         } else {
             let fields = frame.fields(i, j);
-            landscape.cell(&fields)?.map(|cell| (cell, fields))
+            let row = match landscape.features {
+                Some(_) => Some(cells.len()),
+                None => landscape.cell(&fields)?,
+            };
+            row.map(|cell| (cell, fields))
         };
         cells.push(match state {
             None => None,

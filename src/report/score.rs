@@ -1,6 +1,8 @@
 //! The potentials of a study, ranked before training, and how that ranking compares with what
 //! training showed.
 
+use std::fmt::Write;
+
 use serde_json::{Value, json};
 
 use super::audit::short;
@@ -65,8 +67,9 @@ pub fn score_text(plan: &Plan, outcomes: &[Outcome], trained: Option<&Value>) ->
         let model = scored.samples.map_or(String::new(), |n| {
             format!(", on a model of {n} samples per cell (about that model only)")
         });
-        text += &format!(
-            "{}, gamma {}{model}: an optimal policy earns {}, random actions {}\n",
+        let _ = writeln!(
+            text,
+            "{}, gamma {}{model}: an optimal policy earns {}, random actions {}",
             first.env.id,
             first.agent.float("gamma"),
             short(scored.optimal),
@@ -78,13 +81,13 @@ pub fn score_text(plan: &Plan, outcomes: &[Outcome], trained: Option<&Value>) ->
         }));
         text += &aligned(&rows);
         if let Some(note) = trained.and_then(|t| agreement(plan, outcomes, &group, t)) {
-            text += &format!("{note}\n");
+            let _ = writeln!(text, "{note}");
         }
         text.push('\n');
     }
     for (variant, outcome) in plan.variants.iter().zip(outcomes) {
         if let Err(why) = outcome {
-            text += &format!("{}: not scored, {why}\n", variant.name);
+            let _ = writeln!(text, "{}: not scored, {why}", variant.name);
         }
     }
     text
@@ -125,7 +128,8 @@ fn aligned(rows: &[Vec<String>]) -> String {
         let mut line = String::new();
         for (c, cell) in row.iter().enumerate() {
             let space = " ".repeat(widths[c] - width(cell));
-            line += &if c == 0 { format!("  {cell}{space}") } else { format!("  {space}{cell}") };
+            let (before, after) = if c == 0 { ("", space) } else { (&*space, String::new()) };
+            let _ = write!(line, "  {before}{cell}{after}");
         }
         text += line.trim_end();
         text.push('\n');

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use rhai::{Dynamic, FnPtr, Map};
 
 use super::diagnostic::{Diagnostic, Place, suggest};
+use super::features::FeaturesDraft;
 use super::keys;
 use super::params::{merge_agent, number, show, text, whole};
 use super::plan::GoldenBudget;
@@ -60,11 +61,23 @@ pub(super) struct BinDraft {
     pub(super) spot: Spot,
 }
 
-/// `bins(…)` or `cells(…)`.
+/// `bins(…)`, `cells(…)`, `tiles(…)` or `fourier(…)`.
 #[derive(Debug, Clone)]
 pub(super) enum DiscretiserDraft {
     Bins(Vec<BinDraft>),
     Cells { shape: Vec<usize>, cell: FnPtr },
+    Features(FeaturesDraft),
+}
+
+impl DiscretiserDraft {
+    /// The fields that are cut up, with their ranges.
+    pub(super) fn ranges(&self) -> &[BinDraft] {
+        match self {
+            Self::Bins(bins) => bins,
+            Self::Features(features) => &features.ranges,
+            Self::Cells { .. } => &[],
+        }
+    }
 }
 
 /// `experiment(#{ … })`.
@@ -178,7 +191,9 @@ impl ExperimentDraft {
             "discretiser" if removed => self.discretiser = None,
             "discretiser" => {
                 let draft = value.clone().flatten().try_cast::<DiscretiserDraft>();
-                let value = draft.ok_or_else(|| wrong(key, "bins(..) or cells(..)", value))?;
+                let value = draft.ok_or_else(|| {
+                    wrong(key, "bins(..), cells(..), tiles(..) or fourier(..)", value)
+                })?;
                 self.discretiser = Some(Located { value, spot: spot(key) });
             }
             "episodes" => {

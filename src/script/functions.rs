@@ -47,6 +47,16 @@ const BUILDERS: &[(&str, &str, &str)] = &[
     ),
     ("cells", "cells(n, |s| i) or cells([n1, n2], |s| [i, j])", "scripted cells, numbered from 0"),
     (
+        "tiles",
+        "tiles(#{ field: [lo, hi, n], .., tilings: 8 }) or tiles([[lo, hi, n], ..], 8)",
+        "tile coding for linear values: offset tilings of n tiles per field, without hashing",
+    ),
+    (
+        "fourier",
+        "fourier(order) or fourier(#{ order: 3, field: [lo, hi], .. })",
+        "the Fourier basis for linear values, over all fields or those that are named",
+    ),
+    (
         "learned",
         "learned(eta)",
         "a potential of eta times the learner's own state values, eta · max Q(s, a)",

@@ -22,8 +22,8 @@ pub const KEYS: &[Key] = &[
     key("agent", "agent", "what learns or plans: q_learning(#{..}), … (required)"),
     key(
         "discretiser",
-        "bins(..) or cells(..)",
-        "state → cell; needed where the state is not finite",
+        "bins(..), cells(..), ..",
+        "state → cell, or → features: tiles(..), fourier(..); needed where states are not finite",
     ),
     key(
         "actions",
@@ -56,7 +56,8 @@ pub const KEYS: &[Key] = &[
     key(
         "potential_on",
         "\"cell\" or \"raw\"",
-        "evaluate Φ on the cell's representative (default, keeps the guarantee) or the raw state",
+        "evaluate Φ on the cell's representative (default, keeps the guarantee) or the raw state \
+         (always with tiles and fourier)",
     ),
     key("potential_shift", "number", "added to Φ, except of terminal states; default 0"),
     key(

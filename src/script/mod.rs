@@ -14,6 +14,7 @@ mod diagnostic;
 mod draft;
 mod engine;
 mod errors;
+mod features;
 mod freeze;
 pub mod functions;
 mod host;

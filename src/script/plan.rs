@@ -11,7 +11,7 @@ use super::source::SourceSet;
 use super::value::Value;
 use crate::env::{AnyEnv, EnvConfig, EnvError, EnvSpec};
 use crate::learn::AgentConfig;
-use crate::shaping::{Dim, Scale};
+use crate::shaping::{Dim, FeatureKind, FeatureSpec, Scale};
 
 /// A script function that the host calls while training.
 #[derive(Debug, Clone)]
@@ -63,6 +63,20 @@ pub enum DiscretiserSpec {
         /// The function.
         cell: Callback,
     },
+    /// No cells: features, in which values are linear.
+    Features(FeatureSpec),
+}
+
+impl DiscretiserSpec {
+    /// The range of a field that is cut into bins or has features, and into how many.
+    pub fn dim(&self, field: usize) -> Option<&Dim> {
+        let dims = match self {
+            Self::Bins(dims) => dims,
+            Self::Features(features) => &features.dims,
+            Self::StateIndex | Self::Cells { .. } => return None,
+        };
+        dims.iter().find(|d| d.field == field)
+    }
 }
 
 /// The seeds of a variant.
@@ -91,7 +105,7 @@ pub struct Variant {
     pub agent: AgentConfig,
     /// Functions among its parameters, by their keys.
     pub agent_functions: BTreeMap<&'static str, Callback>,
-    /// State → cell.
+    /// State → cell, or → features.
     pub discretiser: DiscretiserSpec,
     /// Episodes per seed.
     pub episodes: u32,
@@ -178,12 +192,18 @@ impl Variant {
     /// Everything that can change a result of this variant, except the seed.
     pub fn identity(&self) -> Json {
         let digest = |c: &Callback| Json::from(c.digest.as_str());
+        let list = |dims: &[Dim]| -> Vec<Json> {
+            dims.iter().map(|d| serde_json::json!([d.field, d.lo, d.hi, d.n])).collect()
+        };
         let discretiser = match &self.discretiser {
             DiscretiserSpec::StateIndex => Json::from("state_index"),
-            DiscretiserSpec::Bins(dims) => serde_json::json!({
-                "bins": dims.iter().map(|d| serde_json::json!([d.field, d.lo, d.hi, d.n]))
-                    .collect::<Vec<_>>()
-            }),
+            DiscretiserSpec::Bins(dims) => serde_json::json!({ "bins": list(dims) }),
+            DiscretiserSpec::Features(FeatureSpec { kind: FeatureKind::Tiles(n), dims }) => {
+                serde_json::json!({ "tiles": list(dims), "tilings": n })
+            }
+            DiscretiserSpec::Features(FeatureSpec { kind: FeatureKind::Fourier, dims }) => {
+                serde_json::json!({ "fourier": list(dims) })
+            }
             DiscretiserSpec::Cells { shape, cell } => {
                 serde_json::json!({ "cells": shape, "callback": digest(cell) })
             }

@@ -9,6 +9,7 @@ use rhai::FnPtr;
 use super::callback::Callbacks;
 use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
+use super::features::{self, Surroundings};
 use super::freeze::{ALLOWED, OF_STEP};
 use super::plan::{Callback, DiscretiserSpec, Expectation, Plan, SeedList, Variant};
 use super::value::Value;
@@ -111,7 +112,7 @@ impl Resolver<'_> {
             Some(n) => n.value.scales(&schema, spec, &n.spot)?,
             None => Vec::new(),
         };
-        let discretiser = self.discretiser(draft, &agent, spec, &any, &normalise)?;
+        let discretiser = self.discretiser(draft, &agent, spec, &any, &normalise, warnings)?;
         warnings.extend(physical_bins(draft, &schema, &normalise));
         if let Some(clip) = &setting.clip_reward {
             let warning = clipping_warning(clip);
@@ -191,9 +192,14 @@ impl Resolver<'_> {
     ) -> Result<Callback, Diagnostic> {
         let param = agent.value.spec.params.iter().find(|p| p.name == name);
         let signature = param.and_then(|p| p.function).expect("checked when it was merged");
-        if matches!(discretiser, DiscretiserSpec::Cells { .. }) {
+        let without = match discretiser {
+            DiscretiserSpec::Cells { .. } => "scripted cells",
+            DiscretiserSpec::Features(_) => "features",
+            DiscretiserSpec::StateIndex | DiscretiserSpec::Bins(_) => "",
+        };
+        if !without.is_empty() {
             return Err(Diagnostic::error(format!(
-                "scripted cells have no representative to evaluate `{name}` on"
+                "{without} have no representative to evaluate `{name}` on"
             ))
             .at(f.spot.place())
             .hint("use bins(..), or give a number"));
@@ -205,9 +211,10 @@ impl Resolver<'_> {
         &self,
         draft: &ExperimentDraft,
         agent: &Located<AgentConfig>,
-        spec: &EnvSpec,
+        spec: &'static EnvSpec,
         env: &AnyEnv,
         normalise: &[Scale],
+        warnings: &mut Vec<Diagnostic>,
     ) -> Result<DiscretiserSpec, Diagnostic> {
         let has_model = env.finite().is_some();
         if agent.value.is_planner() && draft.setting.frame_skip.is_some_and(|n| n > 1) {
@@ -250,6 +257,13 @@ impl Resolver<'_> {
                 DiscretiserDraft::Bins(bins) => dims(bins, &env.schema(), normalise, spec)
                     .map(DiscretiserSpec::Bins)
                     .map_err(|e| e.at(d.spot.place())),
+                DiscretiserDraft::Features(features) => {
+                    let schema = &env.schema();
+                    let at = Surroundings { spec, schema, normalise, agent };
+                    features::resolve(features, &d.spot, &at, warnings)
+                        .map(DiscretiserSpec::Features)
+                        .map_err(|e| e.at(d.spot.place()))
+                }
                 DiscretiserDraft::Cells { shape, cell } => {
                     let cell = Located { value: cell.clone(), spot: d.spot.clone() };
                     let cell =

@@ -175,7 +175,7 @@ fn actions(value: &Dynamic) -> Result<ActionsDraft, Diagnostic> {
             }
             Ok(ActionsDraft::Rows(rows))
         }
-        None => Err(wrong("actions", expected, value)),
+        _ => Err(wrong("actions", expected, value)),
     }
 }
 

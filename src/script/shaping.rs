@@ -71,7 +71,7 @@ impl Shaping {
 #[derive(Debug, Clone, Default)]
 pub(super) struct ShapingDraft {
     pub(super) potential: Option<Located<PotentialDraft>>,
-    pub(super) raw: bool,
+    pub(super) potential_on: Option<Located<PhiOn>>,
     pub(super) shift: Option<f64>,
     pub(super) advice: Option<Located<FnPtr>>,
     pub(super) advice_on: AdviceOn,
@@ -106,11 +106,12 @@ impl ShapingDraft {
                 self.potential = Some(Located { value: draft, spot });
             }
             "potential_on" => {
-                self.raw = match text(value).as_deref() {
-                    Some("cell") => false,
-                    Some("raw") => true,
+                let value = match text(value).as_deref() {
+                    Some("cell") => PhiOn::Cell,
+                    Some("raw") => PhiOn::Raw,
                     _ => return Err(wrong(key, "\"cell\" or \"raw\"", value)),
-                }
+                };
+                self.potential_on = Some(Located { value, spot });
             }
             "potential_shift" if removed => self.shift = None,
             "potential_shift" => {
@@ -169,17 +170,18 @@ impl Resolver<'_> {
             advice_on: draft.advice_on,
             ..Shaping::default()
         };
+        let potential_on = potential_on(draft.potential_on.as_ref(), discretiser)?;
         let mut potential = None;
         if let Some(Located { value, spot }) = &draft.potential {
             match value {
                 PotentialDraft::Learned(LearnedPotential(eta)) => {
-                    learned(*eta, agent).map_err(|d| d.at(spot.place()))?;
+                    learned(*eta, agent, discretiser).map_err(|d| d.at(spot.place()))?;
                     shaping.learned = Some(*eta);
                 }
                 PotentialDraft::Function(f) => {
                     let f = Located { value: f.clone(), spot: spot.clone() };
                     let callback = self.callback(&f, POTENTIAL)?;
-                    potential_of(&callback, draft.raw, agent, discretiser, warnings)
+                    potential_of(&callback, potential_on, agent, discretiser, warnings)
                         .map_err(|d| d.at(spot.place()))?;
                     potential = Some(callback);
                 }
@@ -196,15 +198,30 @@ impl Resolver<'_> {
             advice(draft.advice_on, agent, discretiser, f.spot.place(), warnings).map_err(wrong)?;
             shaping.advice = Some(self.callback(f, ADVICE)?);
         }
-        let potential_on = if draft.raw { PhiOn::Raw } else { PhiOn::Cell };
         Ok(Resolved { potential, potential_on, shaping })
+    }
+}
+
+/// On what a potential is evaluated: features have no cells.
+fn potential_on(
+    asked: Option<&Located<PhiOn>>,
+    discretiser: &DiscretiserSpec,
+) -> Result<PhiOn, Diagnostic> {
+    match (discretiser, asked.map(|on| on.value)) {
+        (DiscretiserSpec::Features(_), Some(PhiOn::Cell)) => {
+            Err(Diagnostic::error("features have no cells to evaluate the potential on")
+                .at(asked.and_then(|on| on.spot.place()))
+                .hint("leave out `potential_on`: it is evaluated on the state itself"))
+        }
+        (DiscretiserSpec::Features(_), _) => Ok(PhiOn::Raw),
+        (_, on) => Ok(on.unwrap_or(PhiOn::Cell)),
     }
 }
 
 /// What stands against a scripted potential, and what its author should know.
 fn potential_of(
     callback: &Callback,
-    raw: bool,
+    on: PhiOn,
     agent: &AgentConfig,
     discretiser: &DiscretiserSpec,
     warnings: &mut Vec<Diagnostic>,
@@ -216,7 +233,8 @@ fn potential_of(
             agent.spec.name
         )));
     }
-    if raw && !matches!(discretiser, DiscretiserSpec::StateIndex) {
+    let on_cells = matches!(discretiser, DiscretiserSpec::Bins(_) | DiscretiserSpec::Cells { .. });
+    if on == PhiOn::Raw && on_cells {
         let hint = match discretiser {
             DiscretiserSpec::Bins(_) => {
                 "leave out `potential_on: \"raw\"` to evaluate it on each cell's representative"
@@ -232,7 +250,7 @@ fn potential_of(
             .hint(hint);
         warn(warnings, warning);
     }
-    if !raw && matches!(discretiser, DiscretiserSpec::Cells { .. }) {
+    if on == PhiOn::Cell && matches!(discretiser, DiscretiserSpec::Cells { .. }) {
         return Err(Diagnostic::error(
             "scripted cells have no representative to evaluate the potential on",
         )
@@ -281,7 +299,7 @@ fn advice(
         AdviceOn::LookBack if agent.float("gamma") == 0.0 => {
             return Err(Diagnostic::error("look-back advice divides by gamma, which is 0"));
         }
-        AdviceOn::LookBack if agent.spec.is_one_step() => {
+        AdviceOn::LookBack if !agent.spec.learns_from_returns() => {
             let warning = Diagnostic::warning(format!(
                 "with `{name}` look-back advice can change which policy is best"
             ));
@@ -296,18 +314,24 @@ fn advice(
         }
         _ => {}
     }
-    if matches!(discretiser, DiscretiserSpec::Cells { .. }) {
-        return Err(Diagnostic::error(
-            "scripted cells have no representative to evaluate the advice on",
-        )
-        .hint("use bins(..)"));
-    }
-    Ok(())
+    let without = match discretiser {
+        DiscretiserSpec::Cells { .. } => "scripted cells",
+        DiscretiserSpec::Features(_) => "features",
+        DiscretiserSpec::StateIndex | DiscretiserSpec::Bins(_) => return Ok(()),
+    };
+    Err(Diagnostic::error(format!("{without} have no representative to evaluate the advice on"))
+        .hint("use bins(..)"))
 }
 
 /// What stands against a potential of η times the learner's own values.
-fn learned(eta: f64, agent: &AgentConfig) -> Result<(), Diagnostic> {
+fn learned(eta: f64, agent: &AgentConfig, discretiser: &DiscretiserSpec) -> Result<(), Diagnostic> {
     let name = agent.spec.name;
+    if matches!(discretiser, DiscretiserSpec::Features(_)) {
+        return Err(Diagnostic::error(
+            "a `learned` potential is for tables: with linear values nothing says that it settles",
+        )
+        .hint("use bins(..), or give a function"));
+    }
     if !agent.spec.is_one_step() {
         return Err(Diagnostic::error(format!(
             "`{name}` cannot be shaped by its own values: a `learned` potential is for learners of \

@@ -54,8 +54,10 @@ pub(super) fn physical_bins(
     schema: &Schema,
     normalise: &[Scale],
 ) -> Option<Diagnostic> {
-    let Some(DiscretiserDraft::Bins(bins)) = draft.discretiser.as_ref().map(|d| &d.value) else {
-        return None;
+    let discretiser = &draft.discretiser.as_ref()?.value;
+    let what = match discretiser {
+        DiscretiserDraft::Features(_) => "features",
+        _ => "bins",
     };
     let field = |bin: &BinDraft| match &bin.field {
         Ok(name) => schema.fields.iter().position(|f| f.name == name),
@@ -65,12 +67,12 @@ pub(super) fn physical_bins(
         let is_normalised = field(bin).is_some_and(|f| normalise.iter().any(|s| s.field == f));
         is_normalised && bin.lo.abs().max(bin.hi.abs()) > 2.0
     };
-    let bin = bins.iter().find(far)?;
+    let bin = discretiser.ranges().iter().find(far)?;
     Some(
         Diagnostic::warning("the discretiser sees a normalised field from -1 to 1")
             .at(bin.spot.place())
             .note(format!(
-                "these bins go from {} to {}: nearly all of them stay empty",
+                "these {what} go from {} to {}: nearly all of them stay empty",
                 bin.lo, bin.hi
             )),
     )
@@ -99,6 +101,30 @@ fn env_error(draft: &ExperimentDraft, error: EnvError) -> Diagnostic {
     Diagnostic::error(error.message).at(place).maybe_hint(error.hint)
 }
 
+/// The field that `range`, called a `what` in messages, speaks of.
+pub(super) fn field_of(
+    range: &BinDraft,
+    schema: &Schema,
+    spec: &EnvSpec,
+    what: &str,
+) -> Result<usize, Diagnostic> {
+    let at = |d: Diagnostic| d.at(range.spot.place());
+    let n_fields = schema.fields.len();
+    match &range.field {
+        Ok(name) => schema.fields.iter().position(|f| f.name == name).ok_or_else(|| {
+            let names: Vec<&str> = schema.fields.iter().map(|f| f.name).collect();
+            at(Diagnostic::error(format!("the state of {} has no field `{name}`", spec.id)))
+                .maybe_hint(suggest(name, names))
+        }),
+        Err(i) if *i < n_fields => Ok(*i),
+        Err(i) => Err(at(Diagnostic::error(format!(
+            "{what} number {} is one too many: the state of {} has {n_fields} fields",
+            i + 1,
+            spec.id
+        )))),
+    }
+}
+
 /// The bins with their fields found and their edges in physical units.
 pub(super) fn dims(
     bins: &[BinDraft],
@@ -108,24 +134,7 @@ pub(super) fn dims(
 ) -> Result<Vec<Dim>, Diagnostic> {
     let mut dims = Vec::with_capacity(bins.len());
     for bin in bins {
-        let field = match &bin.field {
-            Ok(name) => schema.fields.iter().position(|f| f.name == name).ok_or_else(|| {
-                let names: Vec<&str> = schema.fields.iter().map(|f| f.name).collect();
-                Diagnostic::error(format!("the state of {} has no field `{name}`", spec.id))
-                    .at(bin.spot.place())
-                    .maybe_hint(suggest(name, names))
-            })?,
-            Err(i) if *i < schema.fields.len() => *i,
-            Err(i) => {
-                return Err(Diagnostic::error(format!(
-                    "bin number {} is one too many: the state of {} has {} fields",
-                    i + 1,
-                    spec.id,
-                    schema.fields.len()
-                ))
-                .at(bin.spot.place()));
-            }
-        };
+        let field = field_of(bin, schema, spec, "bin")?;
         let scale = normalise.iter().find(|scale| scale.field == field);
         let [lo, hi] = [bin.lo, bin.hi].map(|x| scale.map_or(x, |scale| scale.physical(x)));
         dims.push(Dim { field, lo, hi, n: bin.n });

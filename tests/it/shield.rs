@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use runner::env::{EnvVisitor, make};
 use runner::experiment::{Limits, World, train};
-use runner::learn::registry::{AGENTS, Build, Setup, TabularAgent};
+use runner::learn::registry::{AGENTS, Setup, TabularAgent};
 use runner::learn::{Agent, AgentConfig, Exploration, Last, Learn, ParamValue, QTable};
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::streams::Stream;
@@ -17,7 +17,9 @@ use runner::shaping::{
 };
 use serde_json::json;
 
-use crate::support::{code, expect_code, folder, run, runner, stderr, stdout, stored, write};
+use crate::support::{
+    build_of, code, expect_code, folder, run, runner, stderr, stdout, stored, write,
+};
 
 /// Checks every action against what was allowed where it was taken.
 struct Witness {
@@ -95,11 +97,7 @@ impl EnvVisitor for Temptation {
                 } else if exploration != Exploration::EpsilonGreedy {
                     continue;
                 }
-                let (Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. }) =
-                    spec.build
-                else {
-                    continue;
-                };
+                let Some(build) = build_of(spec) else { continue };
                 let agent = build(&config, setup(&env)).boxed();
                 self.tempt(spec.name, &env, agent);
                 tried += 1;
@@ -115,15 +113,8 @@ fn setup<E: Env>(env: &E) -> Setup {
     let (n_states, n_actions) = (env.n_states().unwrap(), env.n_actions());
     let value = |i| if refused(i / n_actions).contains(i % n_actions) { 0.0 } else { TEMPTING };
     let initial_q = Some((0..n_states * n_actions).map(value).collect());
-    Setup {
-        n_states,
-        n_actions,
-        seed: 3,
-        stream: Stream::new(3, "agent"),
-        initial_q,
-        initial_v: None,
-        policy: None,
-    }
+    let stream = Stream::new(3, "agent");
+    Setup { n_states, n_actions, seed: 3, stream, initial_q, initial_v: None, policy: None }
 }
 
 impl Temptation {
@@ -185,21 +176,11 @@ impl EnvVisitor for OneCell {
             reward: NativeReward,
         };
         let spec = AGENTS.iter().find(|spec| spec.name == "sarsa_lambda").unwrap();
-        let (Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. }) =
-            spec.build
-        else {
-            panic!("a learner")
-        };
+        let build = build_of(spec).expect("a learner");
         let stream = Stream::new(0, "agent");
-        let setup = Setup {
-            n_states: 1,
-            n_actions: 2,
-            seed: 0,
-            stream,
-            initial_q: None,
-            initial_v: None,
-            policy: None,
-        };
+        let (initial_q, initial_v, policy) = (None, None, None);
+        let setup =
+            Setup { n_states: 1, n_actions: 2, seed: 0, stream, initial_q, initial_v, policy };
         let agent = build(&AgentConfig::new(spec), setup).boxed();
         let mut witness = Witness { agent, seen: Vec::new() };
         let limits = Limits { episodes: 20, max_steps: Some(500), ..Limits::EPISODE };
@@ -241,11 +222,13 @@ let learned = planned.with(#{
 study("closed", [
     planned,
     planned.with(#{ name: "shaped", potential: closer }),
+    planned.with(#{ name: "iterated", agent: policy_iteration(#{ gamma: 0.9 }) }),
     learned,
     learned.with(#{ name: "paid", terms: #{ stay: |t| if t.state.row == 2 { 0.5 } else { 0.0 } } }),
 ])
     .expect("the planner goes round", |r| r.planned.final_return.mean == 1.0)
     .expect("with a potential too", |r| r.shaped.final_return.mean == 1.0)
+    .expect("and by policy iteration", |r| r.iterated.final_return.mean == 1.0)
     .expect("which keeps the policy", |r| r.shaped.audit.policy_preserved)
     .expect("the learner finds a way", |r| r.learned.final_return.mean > 0.9)
     .expect("pay for staying does not", |r| !r.paid.audit.policy_preserved)
@@ -255,7 +238,7 @@ study("closed", [
 fn planners_go_round_what_is_refused() {
     let dir = folder();
     let results = stored(dir.path(), CLOSED);
-    for variant in ["planned", "shaped", "learned"] {
+    for variant in ["planned", "shaped", "iterated", "learned"] {
         let played = run(&["play", results.to_str().unwrap(), "--variant", variant]);
         expect_code(&played, 0);
         let said = stderr(&played);

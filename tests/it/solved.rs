@@ -81,13 +81,14 @@ fn progress_on_dry_land_pays_for_going_to_and_fro() {
     assert_eq!((judged.change.best, judged.change.worst), (0.0, 0.0));
     assert_eq!(judged.change.worst_endings.terminated, 0.0);
     assert_eq!(judged.change.optimal_endings.goal, 1.0);
-    let hacking = judged.pair.hacking().unwrap().expect("a loop");
+    let hacking = judged.pair.hacking(&judged.change).unwrap().expect("a loop");
     let mut states = hacking.cycle.states.clone();
     states.sort_unstable();
     assert_eq!(states, [61, 62]);
     assert!(hacking.cycle.deterministic);
     close(hacking.cycle.gain, 0.1, 1e-12);
-    assert_eq!((hacking.cycle.native, hacking.reached, hacking.loops), (0.0, 1.0, 1));
+    assert_eq!((hacking.cycle.native, hacking.reached, hacking.loops), (0.0, 1.0, 2));
+    // The other one is at the other side of the goal.
     assert!(hacking.learned > hacking.learned_optimal && hacking.native < hacking.native_optimal);
 }
 
@@ -102,7 +103,7 @@ fn a_step_cost_does_no_harm_on_dry_land_and_much_on_ice() {
     close(ice.change.optimal, 0.415, 1e-3);
     close(ice.change.worst, 0.206, 1e-3);
     assert!(ice.change.worst_endings.goal < 0.5 && ice.change.optimal_endings.goal > 0.8);
-    assert_eq!(ice.pair.hacking().unwrap(), None, "dying soon is no loop");
+    assert_eq!(ice.pair.hacking(&ice.change).unwrap(), None, "dying soon is no loop");
     // A tenth of it is too much: V and V_F of both policies at 0.1018 say so.
     assert!(ice.pair.critical().unwrap().k.unwrap() < 0.11);
 }
@@ -125,7 +126,7 @@ fn a_bonus_for_picking_up_is_earned_again_and_again() {
     let judged = judge(&mdp, &pickup(&mdp, 2.5));
     assert_eq!(judged.sets.states_changed.len(), 89);
     close(judged.change.worst, -100.0, 1e-9);
-    let hacking = judged.pair.hacking().unwrap().expect("a loop");
+    let hacking = judged.pair.hacking(&judged.change).unwrap().expect("a loop");
     // Pick up, put down: the optimum there is 9.6.
     assert_eq!((hacking.cycle.states.len(), &hacking.cycle.actions[..]), (2, &[4, 5][..]));
     close(hacking.cycle.gain, 0.5, 1e-12);
@@ -173,7 +174,7 @@ fn which_tasks_have_values_without_discounting() {
     let check = |mdp: &FiniteMdp| {
         Pair::new(mdp, &vec![0.0; mdp.outcomes().len()], 1.0).map(|pair| {
             let change = pair.policy_change().unwrap();
-            assert_eq!(change.optimal_endings.terminated, 1.0);
+            assert!(change.optimal_endings.terminated > 1.0 - 1e-12);
             pair.preservation(&vec![0.0; mdp.n_states()]).verdict
         })
     };
@@ -208,7 +209,7 @@ fn progress_along_the_cliff_does_no_harm() {
     let progress = |s, t| 2.0 * (to_the_end(s) - to_the_end(t)).max(0.0);
     let judged = judge(&mdp, &added(&mdp, |s, t, _| progress(s, t)));
     assert_eq!(judged.sets.verdict, Verdict::Preserved);
-    assert_eq!(judged.pair.hacking().unwrap(), None);
+    assert_eq!(judged.pair.hacking(&judged.change).unwrap(), None);
     assert!(judged.pair.critical().unwrap().k.unwrap() > 1.0);
 }
 
@@ -226,7 +227,7 @@ fn a_loop_that_pays_less_than_the_task_is_not_reported() {
             .any(|(same, f)| *same > 0.0 && *f > 0.0)
     );
     assert_eq!(judged.sets.verdict, Verdict::Preserved);
-    assert_eq!(judged.pair.hacking().unwrap(), None);
+    assert_eq!(judged.pair.hacking(&judged.change).unwrap(), None);
     assert_eq!(judged.pair.critical().unwrap(), Critical { k: None, breaks_ties: false });
 }
 
@@ -243,11 +244,11 @@ fn a_shaping_gamma_of_its_own_pays_for_parking() {
     };
     let (safe, pair) = judged(0.0714);
     close(safe.worst, 0.878, 1e-3);
-    assert_eq!(pair.hacking().unwrap(), None);
+    assert_eq!(pair.hacking(&safe).unwrap(), None);
     let (harmful, pair) = judged(0.1);
     close(harmful.optimal, 0.878, 1e-3);
     assert_eq!(harmful.best, 0.0);
-    let hacking = pair.hacking().unwrap().expect("a place to park");
+    let hacking = pair.hacking(&harmful).unwrap().expect("a place to park");
     assert!([55, 62].contains(&hacking.cycle.states[0]) && hacking.cycle.states.len() == 1);
     let critical = judged(1.0).1.critical().unwrap();
     close(critical.k.unwrap(), 1.0 / 13.0, 1e-9);
@@ -304,14 +305,13 @@ fn cut_off(mdp: &FiniteMdp, bootstraps: bool, phi: &[f64], kept: bool) -> Finite
 #[test]
 fn a_cut_off_state_keeps_its_potential_if_it_is_bootstrapped_from() {
     let near: Vec<f64> = (0..64).map(|s| 14.0 - d(s)).collect();
-    let aboard: Vec<f64> = (0..500).map(|s| if inside(s) { 20.0 } else { 0.0 }).collect();
-    for (mdp, phi) in [(lake(false), &near), (lake(true), &near), (taxi(), &aboard)] {
+    let south: Vec<f64> = (0..500).map(|s| (s / 100) as f64).collect();
+    for (mdp, phi) in [(lake(false), &near), (lake(true), &near), (taxi(), &south)] {
         let zero = vec![0.0; phi.len()];
         for (bootstraps, kept) in [(true, true), (true, false), (false, true), (false, false)] {
             let plain = cut_off(&mdp, bootstraps, &zero, kept);
             let shaped = cut_off(&mdp, bootstraps, phi, kept);
             let sets = Pair::of_models(&plain, &shaped, GAMMA).unwrap().preservation(phi);
-            println!("{bootstraps} {kept} {} {}", sets.identity_error, sets.states_changed.len());
             if bootstraps == kept {
                 assert_eq!(sets.verdict, Verdict::Preserved);
                 assert!(sets.identity_error <= 1e-12, "{}", sets.identity_error);

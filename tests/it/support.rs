@@ -4,6 +4,18 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use runner::learn::registry::{AgentSpec, Build, BuildFn};
+
+/// How a learner of action values is built; `None` for planners and predictors.
+pub(crate) fn build_of(spec: &AgentSpec) -> Option<BuildFn> {
+    match spec.build {
+        Build::Learner(build) | Build::OnPolicy { build, .. } | Build::OneStep { build, .. } => {
+            Some(build)
+        }
+        Build::Predictor(_) | Build::Planner(_) => None,
+    }
+}
+
 /// A folder that vanishes with the test.
 pub(crate) fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")

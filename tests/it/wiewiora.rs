@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 
 use runner::env::{EnvVisitor, make};
 use runner::experiment::{Limits, World, train};
-use runner::learn::registry::{Build, Setup, TabularAgent, find};
+use runner::learn::registry::{Setup, TabularAgent, find};
 use runner::learn::{Agent, AgentConfig, Exploration, Last, Learn, ParamValue, QTable, Schedule};
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::streams::Stream;
@@ -19,6 +19,8 @@ use runner::shaping::{
     CellPotential, NativeReward, NoPotential, Potential, RewardModel, StateIndex, Transition,
 };
 use serde_json::json;
+
+use crate::support::build_of;
 
 /// Where it is tried.
 #[derive(Clone, Copy)]
@@ -100,19 +102,13 @@ fn agent(task: Task, (name, params): Learner, replayed: bool, q: QTable) -> Box<
         config.params.insert("epsilon", ParamValue::Schedule(Schedule::constant(1.0)));
         config.params.insert("exploration", ParamValue::Exploration(Exploration::EpsilonGreedy));
     }
-    let (Build::Learner(build) | Build::OnPolicy(build) | Build::OneStep { build, .. }) =
-        config.spec.build
-    else {
-        panic!("{name} is a learner")
-    };
+    let build = build_of(config.spec).unwrap_or_else(|| panic!("{name} is a learner"));
     let (n_states, n_actions) = (q.n_states(), q.n_actions());
     let stream = Stream::new(9, "agent");
     let initial_q = Some(q.values().to_vec());
-    build(
-        &config,
-        Setup { n_states, n_actions, seed: 9, stream, initial_q, initial_v: None, policy: None },
-    )
-    .boxed()
+    let (seed, initial_v, policy) = (9, None, None);
+    build(&config, Setup { n_states, n_actions, seed, stream, initial_q, initial_v, policy })
+        .boxed()
 }
 
 /// Writes down what an agent sees and does.

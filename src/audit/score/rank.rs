@@ -12,7 +12,7 @@ pub fn spearman(a: &[f64], b: &[f64], tolerance: f64) -> Option<f64> {
     if a.iter().chain(b).any(|x| x.is_nan()) {
         return None;
     }
-    let middle = (a.len() as f64 + 1.0) / 2.0;
+    let middle = f64::midpoint(1.0, a.len() as f64);
     let (a, b) = (ranks(a, tolerance), ranks(b, tolerance));
     let (mut product, mut squares_a, mut squares_b) = (0.0, 0.0, 0.0);
     for (a, b) in a.iter().zip(&b) {
@@ -33,8 +33,10 @@ fn ranks(values: &[f64], tolerance: f64) -> Vec<f64> {
     let tied =
         |i: &usize, j: &usize| values[*i] == values[*j] || values[*j] - values[*i] <= tolerance;
     for group in order.chunk_by(tied) {
-        let rank = before as f64 + (group.len() as f64 + 1.0) / 2.0;
-        group.iter().for_each(|&i| ranks[i] = rank);
+        let rank = before as f64 + f64::midpoint(1.0, group.len() as f64);
+        for &i in group {
+            ranks[i] = rank;
+        }
         before += group.len();
     }
     ranks

@@ -24,7 +24,7 @@ pub struct TerminalPotential {
 /// terminal transition: what all transitions agree with.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
-    /// γ_F; the learner's if that is not the mistake.
+    /// `γ_F`; the learner's if that is not the mistake.
     pub gamma: f64,
     /// Φ of every terminal state, in order; empty if it is 0 in all of them.
     pub terminals: Vec<TerminalPotential>,

@@ -264,10 +264,10 @@ impl Links {
             }
         }
         let mut free = 0;
-        for a in 0..self.to.len() {
+        for (a, x) in chosen.into_iter().enumerate() {
             if self.to[a] as usize == a && self.known[a].is_none() {
                 free += 1;
-                self.known[a] = Some(chosen[a].unwrap_or(0.0));
+                self.known[a] = Some(x.unwrap_or(0.0));
             }
         }
         free

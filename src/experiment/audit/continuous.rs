@@ -175,7 +175,9 @@ pub(super) fn try_out<E: Env + Clone + 'static>(
     let gamma = variant.agent.float("gamma");
     let mut asked = ranges(&env.schema());
     if let DiscretiserSpec::Bins(dims) = &variant.discretiser {
-        dims.iter().for_each(|d| asked[d.field] = [d.lo, d.hi]);
+        for d in dims {
+            asked[d.field] = [d.lo, d.hi];
+        }
     }
     let settings =
         QuerySettings { gamma, quadruples: QUADRUPLES, ranges: asked, terminates: true, seed: 0 };

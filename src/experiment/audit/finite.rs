@@ -125,13 +125,9 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     let preserved = match (&compared, &pair) {
         (Some(compared), _) => compared.verdict.preserved(),
         // Whoever goes round for ever earns without limit: no policy of the task's is optimal.
-        (None, Err(Unsolved::Learned(SspCheck::NotSsp { why, .. }))) => match why {
-            NotSsp::PayingLoop { cycle, .. } => {
-                exact.endless.clone_from(cycle);
-                Some(false)
-            }
-            _ => None,
-        },
+        (None, Err(Unsolved::Learned(SspCheck::NotSsp { why: NotSsp::PayingLoop { .. }, .. }))) => {
+            Some(false)
+        }
         _ => None,
     };
     let verdict = match checked.finding {
@@ -139,30 +135,24 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         Finding::Fails => AuditVerdict::NotPotentialBased,
         Finding::Inconclusive => AuditVerdict::Inconclusive,
     };
-    let basis = match (&pair, preserved) {
-        (Err(unsolved), _) => format!("{unsolved}"),
-        (Ok(_), None) => "two actions are too close for the numbers to decide".into(),
-        (Ok(_), Some(false)) => "exact: the greedy sets differ".into(),
-        (Ok(_), Some(true)) => match (verdict, potential_only) {
-            (AuditVerdict::PotentialBased, true) => beyond_states(variant)
-                .unwrap_or("exact: Q_F + Φ = Q and the greedy sets are equal")
-                .into(),
-            (AuditVerdict::PotentialBased, false) => {
-                "exact: every transition agrees with one potential".into()
-            }
-            _ => "exact: the greedy sets are equal".into(),
-        },
-    };
+    let basis = basis(variant, verdict, preserved, pair.as_ref().err());
     let mut audit = Audit::new(verdict, preserved, basis);
     if verdict == AuditVerdict::NotPotentialBased {
         audit.instead = Some(replacement(variant, exact.pattern, Some(&checked)));
         exact.broken_task = broken_task(mdp, &dynamics, &f, gamma).ok().flatten();
     }
+    if let Err(Unsolved::Learned(SspCheck::NotSsp {
+        why: NotSsp::PayingLoop { cycle, .. }, ..
+    })) = &pair
+    {
+        exact.endless.clone_from(cycle);
+    }
     if let Ok(pair) = &pair {
         exact.change = pair.policy_change().ok();
         if verdict == AuditVerdict::NotPotentialBased {
             exact.critical = pair.critical().ok();
-            exact.hacking = pair.hacking().ok().flatten();
+            let change = exact.change.as_ref();
+            exact.hacking = change.and_then(|change| pair.hacking(change).ok().flatten());
         }
     }
     audit.true_return =
@@ -177,6 +167,28 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     }
     audit.exact = Some(Box::new(exact));
     Ok(audit)
+}
+
+/// On what the verdict on two models rests.
+fn basis(
+    variant: &Variant,
+    verdict: AuditVerdict,
+    preserved: Option<bool>,
+    unsolved: Option<&Unsolved>,
+) -> String {
+    let text = match (unsolved, preserved, verdict) {
+        (Some(unsolved), ..) => return unsolved.to_string(),
+        (_, None, _) => "two actions are too close for the numbers to decide",
+        (_, Some(false), _) => "exact: the greedy sets differ",
+        (_, Some(true), AuditVerdict::PotentialBased) if variant.changes_reward() => {
+            "exact: every transition agrees with one potential"
+        }
+        (_, Some(true), AuditVerdict::PotentialBased) => {
+            beyond_states(variant).unwrap_or("exact: Q_F + Φ = Q and the greedy sets are equal")
+        }
+        (_, Some(true), _) => "exact: the greedy sets are equal",
+    };
+    text.into()
 }
 
 /// A reward that depends on more than the transition: episodes can still be compared.

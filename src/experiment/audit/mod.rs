@@ -190,8 +190,12 @@ impl EnvVisitor for Judge<'_> {
 
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let Self { host, variant, thorough } = self;
-        let indexed = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
-        if indexed && variant.frame_skip == 1 && env.finite().is_some() {
+        // Features have no cells: what is said is said of the states themselves.
+        let on_states = matches!(
+            variant.discretiser,
+            DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_)
+        );
+        if on_states && variant.frame_skip == 1 && env.finite().is_some() {
             return finite::judge(host, variant, &env);
         }
         let mut audit = if variant.changes_reward() {
@@ -208,11 +212,12 @@ impl EnvVisitor for Judge<'_> {
 
 /// What a learner knows of advice on the step before is gone when it bootstraps.
 fn look_back(variant: &Variant) -> Audit {
-    let basis = if variant.agent.spec.is_one_step() {
-        "look-back advice: a learner that bootstraps does not take all of it back"
-    } else {
-        "look-back advice is taken back over whole returns only"
-    };
+    if variant.agent.spec.learns_from_returns() && !variant.changes_reward() {
+        let basis = "by construction: a return takes back the advice on the step before it, and \
+                     no more";
+        return Audit::new(AuditVerdict::PotentialBased, Some(true), basis);
+    }
+    let basis = "look-back advice: a learner that bootstraps does not take all of it back";
     Audit::new(AuditVerdict::Inconclusive, None, basis)
 }
 
@@ -233,8 +238,9 @@ fn beyond_states(variant: &Variant) -> Option<&'static str> {
 fn by_construction(variant: &Variant) -> Audit {
     let raw = variant.potential.is_some() && variant.potential_on == PhiOn::Raw;
     let (preserved, basis) = match (&variant.discretiser, raw, beyond_states(variant)) {
-        (DiscretiserSpec::StateIndex, _, Some(why)) | (_, false, Some(why)) => (Some(true), why),
-        (DiscretiserSpec::StateIndex, _, None) => {
+        (DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_), _, Some(why))
+        | (_, false, Some(why)) => (Some(true), why),
+        (DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_), _, None) => {
             (Some(true), "by construction: Φ is a function of the state")
         }
         (_, false, None) => {

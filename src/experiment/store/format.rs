@@ -1,5 +1,5 @@
 //! The files of a unit: `monitor.csv`, `policy.csv`, `values.csv`, `sweeps.csv`, and the marks in
-//! `result.json`.
+//! `result.json`. `weights.csv` has a file of its own.
 
 use std::fmt::Write;
 
@@ -28,7 +28,15 @@ pub(super) struct ResultFile {
     /// Shape of the table of action values; no actions if it holds state values.
     pub(super) states: usize,
     pub(super) actions: usize,
+    /// Where values are linear in features, the number of these; no states then.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(super) features: usize,
     pub(super) files: std::collections::BTreeMap<String, FileMark>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_zero(n: &usize) -> bool {
+    *n == 0
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,15 +50,15 @@ pub(super) fn mark(bytes: &[u8]) -> FileMark {
 }
 
 /// A float as the shortest text that reads back as the same float.
-fn float(x: f64) -> String {
+pub(super) fn float(x: f64) -> String {
     format!("{x:?}")
 }
 
-fn csv_bytes(writer: csv::Writer<Vec<u8>>) -> Vec<u8> {
+pub(super) fn csv_bytes(writer: csv::Writer<Vec<u8>>) -> Vec<u8> {
     writer.into_inner().expect("writing to memory does not fail")
 }
 
-const NEVER: &str = "writing to memory does not fail";
+pub(super) const NEVER: &str = "writing to memory does not fail";
 
 /// The column of a predictor's errors.
 const VALUE_ERROR: &str = "value_error";
@@ -155,10 +163,7 @@ pub(super) fn policy(variant: &Variant, q: &QTable) -> Vec<u8> {
 }
 
 /// Reads what [`policy`] writes, for a table of `shape` `(states, actions)`.
-pub(super) fn read_policy(
-    bytes: &[u8],
-    shape: (usize, usize),
-) -> Result<Vec<(usize, Vec<f64>)>, String> {
+pub(super) fn read_policy(bytes: &[u8], shape: (usize, usize)) -> Result<Rows, String> {
     let (n_states, n_actions) = shape;
     let mut reader = csv::Reader::from_reader(bytes);
     let mut header = vec!["state".to_string(), "greedy".to_string()];
@@ -170,23 +175,13 @@ pub(super) fn read_policy(
             header.join(",")
         ));
     }
-    let mut table: Vec<(usize, Vec<f64>)> = Vec::new();
+    let mut table = Rows::new();
     for (i, line) in reader.records().enumerate() {
         let line = line.map_err(|e| e.to_string())?;
-        let bad = |what: &str| format!("line {}: {what}", i + 2);
-        let state = line.get(0).and_then(|s| s.parse().ok());
-        let state = state.ok_or_else(|| bad("the state is no number"))?;
-        if state >= n_states {
-            return Err(bad(&format!("there is no state {state} among {n_states}")));
-        }
-        if table.last().is_some_and(|(before, _)| *before >= state) {
-            return Err(bad("the states are not in ascending order"));
-        }
-        let values = line.iter().skip(2).map(|s| s.parse().ok().filter(|v: &f64| v.is_finite()));
-        let values: Option<Vec<f64>> = values.collect();
-        let values = values.ok_or_else(|| bad("a value is no finite number"))?;
+        let bad = |what: String| format!("line {}: {what}", i + 2);
+        let (state, values) = row(&line, "state", n_states, 2, &table).map_err(bad)?;
         if line[1] != *argmax_tol(&values).to_string() {
-            return Err(bad(&format!(
+            return Err(bad(format!(
                 "`greedy` is {}, but by its values it is {}",
                 &line[1],
                 argmax_tol(&values)
@@ -195,6 +190,31 @@ pub(super) fn read_policy(
         table.push((state, values));
     }
     Ok(table)
+}
+
+/// Numbered rows of values, in ascending order.
+pub(super) type Rows = Vec<(usize, Vec<f64>)>;
+
+/// A line that begins with the number of a `what`, of which there are `n`, and has values from
+/// column `from` on; `table` holds the lines before it.
+pub(super) fn row(
+    line: &csv::StringRecord,
+    what: &str,
+    n: usize,
+    from: usize,
+    table: &Rows,
+) -> Result<(usize, Vec<f64>), String> {
+    let number = line.get(0).and_then(|s| s.parse().ok());
+    let number = number.ok_or_else(|| format!("the {what} is no number"))?;
+    if number >= n {
+        return Err(format!("there is no {what} {number} among {n}"));
+    }
+    if table.last().is_some_and(|(before, _)| *before >= number) {
+        return Err(format!("the {what}s are not in ascending order"));
+    }
+    let values = line.iter().skip(from).map(|s| s.parse().ok().filter(|v: &f64| v.is_finite()));
+    let values: Option<Vec<f64>> = values.collect();
+    Ok((number, values.ok_or("a value is no finite number")?))
 }
 
 const VALUES_HEADER: [&str; 3] = ["state", "v", "exact"];

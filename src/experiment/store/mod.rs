@@ -8,6 +8,7 @@
 
 mod atomic;
 mod format;
+mod weights;
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -18,12 +19,14 @@ use self::format::{
     ResultFile, SCHEMA, StoredValue, initial_value, is_initial, mark, monitor, policy,
     read_monitor, read_policy, read_values, sweeps, values,
 };
+use self::weights::{Initial, weights};
 use super::record::{EpisodeRow, Learned, UnitRecord, Values};
 use super::unit::Unit;
 use crate::learn::QTable;
 use crate::script::Variant;
 
 pub use atomic::{write_atomically, write_atomically_with};
+pub use weights::{holds_weights, read_weights};
 
 /// A file could not be written or read, or holds something else than it should.
 #[derive(Debug)]
@@ -60,21 +63,30 @@ pub struct StoredUnit {
     /// Its episodes.
     pub rows: Vec<EpisodeRow>,
     /// Its greedy policy and values: `(state, values)` of every state whose values were learned.
+    /// Where values are linear, `(feature, weights)`.
     pub q: Vec<(usize, Vec<f64>)>,
     /// Its state values, if that is what was learned: `(state, value, exact value)`, of the same
     /// states.
     pub values: Vec<StoredValue>,
-    /// Number of states and actions of the table; no actions if it holds state values.
+    /// Number of states (or features) and actions of the table; no actions if it holds state values.
     pub shape: (usize, usize),
 }
 
 impl StoredUnit {
-    /// The values, if the agent of `variant`, whose unit this is, keeps any.
+    /// The values (or the weights), if the agent of `variant`, whose unit this is, keeps any.
     pub fn learned(&self, variant: &Variant) -> Option<Learned> {
         let (n_states, n_actions) = self.shape;
         let initial = initial_value(variant);
         if n_states == 0 {
             return None;
+        }
+        if let Some(initial) = Initial::of(variant, n_actions) {
+            let mut experienced = vec![false; n_states];
+            for (feature, row) in &self.q {
+                experienced[*feature] = !initial.holds(*feature, row);
+            }
+            let weights = initial.filled(&self.q).weights().clone();
+            return Some(Learned { values: Values::Q(weights), experienced });
         }
         if n_actions == 0 {
             let mut v = vec![initial.unwrap_or(0.0); n_states];
@@ -208,6 +220,9 @@ impl Store {
         if let Some(q) = &record.q {
             files.push(("policy.csv", policy(variant, q)));
         }
+        if let Some(w) = &record.weights {
+            files.push(("weights.csv", weights(variant, w)));
+        }
         if let Some(v) = &record.values {
             files.push(("values.csv", values(variant, v)));
         }
@@ -225,7 +240,8 @@ impl Store {
                 .q
                 .as_ref()
                 .map_or(record.values.as_ref().map_or(0, |v| v.v.len()), QTable::n_states),
-            actions: record.q.as_ref().map_or(0, QTable::n_actions),
+            actions: record.q.as_ref().or(record.weights.as_ref()).map_or(0, QTable::n_actions),
+            features: record.weights.as_ref().map_or(0, QTable::n_states),
             files: files.iter().map(|(name, bytes)| ((*name).into(), mark(bytes))).collect(),
         };
         let mut text = serde_json::to_vec_pretty(&result)
@@ -291,12 +307,13 @@ impl Store {
     pub fn load(&self, unit: &Unit) -> Result<StoredUnit, StoreError> {
         let (result, files) = self.verified(unit)?;
         let folder = self.path(unit);
-        let shape = (result.states, result.actions);
+        let shape = (result.states + result.features, result.actions);
         let mut stored = StoredUnit { rows: Vec::new(), q: Vec::new(), values: Vec::new(), shape };
         for (name, bytes) in &files {
             let bad = |what: String| StoreError::new(&folder.join(name), what);
             match name.as_str() {
                 "monitor.csv" => stored.rows = read_monitor(bytes).map_err(bad)?,
+                "weights.csv" => stored.q = weights::read(bytes, shape).map_err(bad)?,
                 "policy.csv" => stored.q = read_policy(bytes, stored.shape).map_err(bad)?,
                 "values.csv" => {
                     stored.values = read_values(bytes, stored.shape.0).map_err(bad)?;

@@ -1,8 +1,8 @@
 //! Eligibility traces of pairs (s, a) (Sutton & Barto 2018, section 12.7; Singh & Sutton 1996).
 //!
 //! Per step, with the error δ of the pair just visited, for every pair: `e ← γ λ e`, then for the
-//! visited one `e ← e + 1` (accumulating) or `e ← 1` (replacing), then `Q ← Q + α δ e`. Only pairs
-//! whose trace is not 0 are kept. Traces are stored as multiples of one factor that decays, so
+//! visited one `e ← e + 1` (accumulating), `e ← 1` (replacing) or `e ← e + 1 − α e` (dutch; section
+//! 12.5), then `Q ← Q + α δ e`. Only pairs whose trace is not 0 are kept. Traces are stored as multiples of one factor that decays, so
 //! that a step costs each of them one multiplication and no write but that of Q.
 //!
 //! Deviation 1: a trace below `cutoff` counts as 0. With a cutoff of 0 none does.
@@ -19,6 +19,8 @@ pub enum Trace {
     Accumulating,
     /// `e ← 1`; the traces of the state's other actions stay.
     Replacing,
+    /// `e ← e + 1 − α e`
+    Dutch,
 }
 
 /// Below this the common factor is multiplied into the traces, before it vanishes.
@@ -61,29 +63,50 @@ impl Traces {
         let pair = q.pair(*s, *a);
         let delta = td_error(q.values()[pair], reward, *gamma, next_value);
         let step = alpha.visit(pair);
-        self.visit(pair);
+        self.visit(pair, step);
         self.learn(q.values_mut(), delta, step, alpha);
     }
 
-    /// `pair` has been visited.
+    /// `pair` has been visited; its values are learned with step size `alpha`.
     #[inline]
-    pub(in crate::learn) fn visit(&mut self, pair: usize) {
-        let one = 1.0 / self.scale;
+    pub(in crate::learn) fn visit(&mut self, pair: usize, alpha: f64) {
+        match self.kind {
+            Trace::Dutch => self.raise(pair, 1.0 - alpha * self.get(pair)),
+            Trace::Accumulating | Trace::Replacing => self.raise(pair, 1.0),
+        }
+    }
+
+    /// What a visit does to a trace.
+    pub(in crate::learn) fn kind(&self) -> Trace {
+        self.kind
+    }
+
+    /// The trace of `pair`.
+    #[inline]
+    pub(in crate::learn) fn get(&self, pair: usize) -> f64 {
+        let entry = self.entries.get(self.place[pair] as usize);
+        entry.map_or(0.0, |entry| entry.base * self.scale)
+    }
+
+    /// Adds `x` to the trace of `pair`, or replaces it by `x`.
+    #[inline]
+    pub(in crate::learn) fn raise(&mut self, pair: usize, x: f64) {
+        let x = x / self.scale;
         let place = self.place[pair];
         if place == NOWHERE {
             self.place[pair] = self.entries.len() as u32;
-            self.entries.push(Entry { pair: pair as u32, base: one });
+            self.entries.push(Entry { pair: pair as u32, base: x });
         } else {
             let base = &mut self.entries[place as usize].base;
             *base = match self.kind {
-                Trace::Accumulating => *base + one,
-                Trace::Replacing => one,
+                Trace::Accumulating | Trace::Dutch => *base + x,
+                Trace::Replacing => x,
             };
         }
     }
 
-    /// `Q ← Q + α δ e` for every pair of `values`, then `e ← γ λ e`. `alpha` is that of the step, `rates` those
-    /// of the pairs where they differ.
+    /// `Q ← Q + α δ e` for every pair of `values`, then `e ← γ λ e`. `alpha` is that of the step,
+    /// `rates` those of the pairs where they differ.
     #[inline]
     pub(in crate::learn) fn learn(
         &mut self,
@@ -93,34 +116,31 @@ impl Traces {
         rates: &StepSize,
     ) {
         match rates.rates() {
-            None => {
-                let change = alpha * delta * self.scale;
-                self.sweep(|pair, base| values[pair] += change * base);
-            }
+            None => self.spread(alpha * delta, |pair, change| values[pair] += change),
             Some(rates) => {
-                let change = delta * self.scale;
-                self.sweep(|pair, base| values[pair] += change * rates[pair] * base);
+                self.spread(delta, |pair, change| values[pair] += rates[pair] * change);
+            }
+        }
+    }
+
+    /// Hands every pair and `size · e` to `each`; then `e ← γ λ e`, and those that this takes below
+    /// the cutoff are forgotten.
+    #[inline]
+    pub(in crate::learn) fn spread(&mut self, size: f64, mut each: impl FnMut(usize, f64)) {
+        let size = size * self.scale;
+        let least = self.cutoff / (self.scale * self.decay);
+        let mut i = 0;
+        while let Some(&Entry { pair, base }) = self.entries.get(i) {
+            each(pair as usize, size * base);
+            if base.abs() < least {
+                self.forget(i);
+            } else {
+                i += 1;
             }
         }
         self.scale *= self.decay;
         if self.scale < SMALLEST_SCALE {
             self.rescale();
-        }
-    }
-
-    /// Hands every pair and base to `each`, and forgets those that the next decay takes below the
-    /// cutoff.
-    #[inline]
-    fn sweep(&mut self, mut each: impl FnMut(usize, f64)) {
-        let least = self.cutoff / (self.scale * self.decay);
-        let mut i = 0;
-        while let Some(&Entry { pair, base }) = self.entries.get(i) {
-            each(pair as usize, base);
-            if base < least {
-                self.forget(i);
-            } else {
-                i += 1;
-            }
         }
     }
 
@@ -139,7 +159,7 @@ impl Traces {
         for i in (0..self.entries.len()).rev() {
             let base = &mut self.entries[i].base;
             *base *= scale;
-            if *base <= self.cutoff {
+            if base.abs() <= self.cutoff {
                 self.forget(i);
             }
         }
@@ -174,9 +194,13 @@ mod tests {
         for _ in 0..3_000 {
             let (pair, delta) = (random.below(PAIRS), random.uniform() - 0.5);
             let step = alpha.visit(pair);
-            traces.visit(pair);
+            traces.visit(pair, step);
             traces.learn(q.values_mut(), delta, step, &alpha);
-            dense[pair] = if kind == Trace::Replacing { 1.0 } else { dense[pair] + 1.0 };
+            dense[pair] = match kind {
+                Trace::Accumulating => dense[pair] + 1.0,
+                Trace::Replacing => 1.0,
+                Trace::Dutch => dense[pair] * (1.0 - step) + 1.0,
+            };
             for i in 0..PAIRS {
                 values[i] += alpha.rates().map_or(step, |rates| rates[i]) * delta * dense[i];
                 dense[i] *= decay;
@@ -196,7 +220,7 @@ mod tests {
     fn sparse_traces_are_dense_traces() {
         let constant = AlphaSource::Schedule(Schedule::constant(0.1));
         let counted = AlphaSource::VisitCount { omega: 0.7 };
-        for kind in [Trace::Accumulating, Trace::Replacing] {
+        for kind in [Trace::Accumulating, Trace::Replacing, Trace::Dutch] {
             for source in [constant, counted] {
                 // 2e-3 per step takes the factor to its limit within a few dozen steps.
                 for decay in [0.0, 2e-3, 0.5, 0.9, 1.0] {
@@ -214,7 +238,7 @@ mod tests {
         let mut q = QTable::new(2, 2, 0.0);
         let alpha = StepSize::new(AlphaSource::Schedule(Schedule::constant(1.0)), 4);
         let mut traces = Traces::new(Trace::Accumulating, 0.5, 0.1, 4);
-        traces.visit(0);
+        traces.visit(0, 1.0);
         // The trace is 1, 0.5, 0.25, 0.125, and then below the cutoff.
         for left in [1, 1, 1, 0, 0] {
             traces.learn(q.values_mut(), 1.0, 1.0, &alpha);

@@ -27,8 +27,8 @@ pub struct PolicyIteration {
 pub enum Start<'a> {
     /// A policy that is greedy after a few sweeps from these values.
     Values(&'a [f64]),
-    /// A policy; with γ = 1 one that is sure to end.
-    Policy(&'a [Action]),
+    /// A policy, with γ = 1 one that is sure to end; and a guess at its values.
+    Policy(&'a [Action], &'a [f64]),
 }
 
 /// An optimal policy and its values, by place.
@@ -62,7 +62,7 @@ impl Problem<'_> {
 
     fn iterate(&self, start: Start<'_>) -> Result<Optimum, PlanError> {
         let (mut policy, mut v) = match start {
-            Start::Policy(policy) => (policy.to_vec(), vec![0.0; self.dynamics.len()]),
+            Start::Policy(policy, guess) => (policy.to_vec(), guess.to_vec()),
             Start::Values(v0) => self.first_policy(v0)?,
         };
         let largest_reward = self.rewards.iter().fold(0.0f64, |m, r| m.max(r.abs()));

@@ -130,6 +130,59 @@ fn the_shortest_way_out_of_a_corridor() {
     assert_eq!(found.changes.len(), found.switched.len());
 }
 
+/// From state 0 to a loop of two states, stochastic: the second is left at once, the first with
+/// probability 1/2. An episode is in them 2/3 and 1/3 of the time.
+#[test]
+fn the_average_of_a_recurrent_set() {
+    let go = |p, to, reward| outcome(p, to, reward, false);
+    let table = [
+        vec![vec![go(0.5, 1, 9.0), outcome(0.5, 0, 0.0, true)]],
+        vec![vec![go(0.5, 1, 1.0), go(0.5, 2, 2.0)]],
+        vec![vec![go(1.0, 1, -3.0)]],
+    ];
+    let mdp = FiniteMdp::new(&table, vec![1.0, 0.0, 0.0]).unwrap();
+    let dynamics = Dynamics::new(&mdp, Over::Reachable);
+    let sets = dynamics.recurrent(Policy::Uniform);
+    assert_eq!(sets, [[1, 2]]);
+    let average = dynamics.average(&dynamics.rewards(&mdp), Policy::Uniform, &sets[0]).unwrap();
+    assert!((average - (1.5 * 2.0 - 3.0) / 3.0).abs() < 1e-15);
+    let ending = dynamics.expect(&mdp, |i| f64::from(u8::from(mdp.outcomes()[i].terminated)));
+    assert_eq!(dynamics.chances(&ending, Policy::Uniform).unwrap(), [0.5, 0.0, 0.0]);
+}
+
+/// Icy ground of 40 × 40 fields, −1 a step, out at one corner: large enough for rough evaluations
+/// first and for the Krylov method, discounted or not.
+#[test]
+fn two_ways_over_the_ice() {
+    const N: i32 = 40;
+    let to = |row: i32, col: i32| {
+        let next = (row.clamp(0, N - 1) * N + col.clamp(0, N - 1)) as u32;
+        outcome(1.0 / 3.0, next, -1.0, next == (N * N - 1) as u32)
+    };
+    let ways = [(0, -1), (1, 0), (0, 1), (-1, 0)];
+    let slip = |s: i32, a: usize| {
+        [3, 0, 1].map(|turn| ways[(a + turn) % 4]).map(|(r, c)| to(s / N + r, s % N + c)).to_vec()
+    };
+    let table: Vec<_> =
+        (0..N * N).map(|s| (0..4).map(|a| slip(s, a)).collect::<Vec<_>>()).collect();
+    let mut initial = vec![0.0; table.len()];
+    initial[0] = 1.0;
+    let mdp = FiniteMdp::new(&table, initial).unwrap();
+    let zero = vec![0.0; table.len()];
+    for gamma in [0.99, 1.0] {
+        let exact = PolicyIteration { gamma }.solve(&mdp, &zero).unwrap();
+        assert!(exact.converged && exact.bound.is_none_or(|bound| bound < 1e-9));
+        let vi = ValueIteration { gamma, theta: 1e-12, max_sweeps: 100_000 };
+        let swept = vi.solve(&mdp, &zero).unwrap();
+        for s in 0..table.len() - 1 {
+            assert!((exact.v[s] - swept.v[s]).abs() < 1e-8, "{gamma}, {s}");
+        }
+        let value =
+            policy_value(&mdp, gamma, Policy::Deterministic(&exact.policy), Over::Reachable);
+        assert!((value.unwrap().v[0] - exact.v[0]).abs() < 1e-9);
+    }
+}
+
 /// A loop that pays has no undiscounted value; the error says where it is.
 #[test]
 fn a_loop_that_pays_is_named() {

@@ -4,6 +4,7 @@ use crate::learn::Seen;
 use crate::learn::greedy::pick_allowed;
 use crate::mdp::Action;
 use crate::mdp::streams::Stream;
+use crate::shaping::ActionSet;
 
 /// A policy that is given, not learned.
 #[derive(Debug, Clone)]
@@ -15,7 +16,7 @@ pub enum GivenPolicy {
         /// Its randomness.
         stream: Stream,
     },
-    /// One action per state.
+    /// One action per state; the first that is allowed where a shield refuses it.
     Fixed(Vec<Action>),
 }
 
@@ -28,7 +29,10 @@ impl GivenPolicy {
                 pick_allowed(*n_actions, s, stream.uniform())
             }
             Self::Random { n_actions, stream } => stream.below(*n_actions),
-            Self::Fixed(actions) => actions[s.cell()],
+            Self::Fixed(actions) => {
+                let a = actions[s.cell()];
+                if s.allows(a) { a } else { pick_allowed(ActionSet::CAPACITY, s, 0.0) }
+            }
         }
     }
 }

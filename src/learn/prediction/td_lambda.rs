@@ -25,7 +25,7 @@ impl TdLambda {
         let Estimate { v, gamma, alpha } = estimate;
         let delta = td_error(v[self.s], reward, *gamma, next_value);
         let step = alpha.visit(self.s);
-        self.traces.visit(self.s);
+        self.traces.visit(self.s, step);
         self.traces.learn(v, delta, step, alpha);
     }
 }

@@ -1,7 +1,7 @@
 //! Agents that learn action values step by step.
 
 use super::shared::{EPSILON, EXPLORATION, GAMMA, INITIAL_Q, STEP_SIZE, UNIT};
-use super::{AgentSpec, AnyAgent, Build, Setup};
+use super::{AgentSpec, AnyAgent, Build, Setup, linear};
 use crate::learn::control::{
     Backup, DoubleQLearning, DynaQ, ExpectedSarsa, NStepSarsa, QLambda, SarsaLambda, SoftQLearning,
     Tabular, Trace, Traces,
@@ -32,6 +32,7 @@ fn schedules(c: &AgentConfig) -> Option<(Schedule, Schedule)> {
 pub(super) fn traces(c: &AgentConfig, n_entries: usize) -> Traces {
     let kind = match c.word("traces") {
         "replacing" => Trace::Replacing,
+        "dutch" => Trace::Dutch,
         _ => Trace::Accumulating,
     };
     let decay = c.float("gamma") * c.float("lambda");
@@ -49,10 +50,10 @@ pub(super) const LAMBDA: ParamSpec = ParamSpec {
 };
 pub(super) const TRACES: ParamSpec = ParamSpec {
     name: "traces",
-    kind: ParamKind::Word(&["accumulating", "replacing"]),
+    kind: ParamKind::Word(&["accumulating", "replacing", "dutch"]),
     function: None,
     default: ParamValue::Word("accumulating"),
-    doc: "what a visit does to a trace: adds 1, or sets it to 1",
+    doc: "what a visit does to a trace e: adds 1, sets it to 1, or adds 1 − αe",
 };
 pub(super) const TRACE_CUTOFF: ParamSpec = ParamSpec {
     name: "trace_cutoff",
@@ -79,6 +80,7 @@ pub(super) const Q_LEARNING: AgentSpec = AgentSpec {
             None => AnyAgent::tabular(QLearning::of(table(c, setup))),
         },
     },
+    linear: Some(linear::q_learning),
 };
 
 pub(super) const SARSA: AgentSpec = AgentSpec {
@@ -95,6 +97,7 @@ pub(super) const SARSA: AgentSpec = AgentSpec {
             None => AnyAgent::tabular(Sarsa::of(table(c, setup))),
         },
     },
+    linear: Some(linear::sarsa),
 };
 
 pub(super) const EXPECTED_SARSA: AgentSpec = AgentSpec {
@@ -105,6 +108,7 @@ pub(super) const EXPECTED_SARSA: AgentSpec = AgentSpec {
         backup: Backup::Expected,
         build: |c, setup| AnyAgent::tabular(ExpectedSarsa::new(table(c, setup))),
     },
+    linear: Some(linear::expected_sarsa),
 };
 
 pub(super) const DOUBLE_Q_LEARNING: AgentSpec = AgentSpec {
@@ -115,6 +119,7 @@ pub(super) const DOUBLE_Q_LEARNING: AgentSpec = AgentSpec {
         let coin = Stream::new(setup.seed, "double Q-learning");
         AnyAgent::tabular(DoubleQLearning::new(table(c, setup), c.alpha(), coin))
     }),
+    linear: None,
 };
 
 pub(super) const N_STEP_SARSA: AgentSpec = AgentSpec {
@@ -134,19 +139,25 @@ pub(super) const N_STEP_SARSA: AgentSpec = AgentSpec {
         EXPLORATION,
         INITIAL_Q,
     ],
-    build: Build::OnPolicy(|c, setup| {
-        AnyAgent::tabular(NStepSarsa::new(table(c, setup), c.int("n") as usize))
-    }),
+    build: Build::OnPolicy {
+        bootstraps: true,
+        build: |c, setup| AnyAgent::tabular(NStepSarsa::new(table(c, setup), c.int("n") as usize)),
+    },
+    linear: None,
 };
 
 pub(super) const SARSA_LAMBDA: AgentSpec = AgentSpec {
     name: "sarsa_lambda",
     doc: "SARSA(λ) with eligibility traces (Rummery 1995; Sutton & Barto 12.7)",
     params: WITH_TRACES,
-    build: Build::OnPolicy(|c, setup| {
-        let traces = traces(c, setup.n_states * setup.n_actions);
-        AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
-    }),
+    build: Build::OnPolicy {
+        bootstraps: true,
+        build: |c, setup| {
+            let traces = traces(c, setup.n_states * setup.n_actions);
+            AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
+        },
+    },
+    linear: Some(linear::sarsa_lambda),
 };
 
 pub(super) const Q_LAMBDA: AgentSpec = AgentSpec {
@@ -157,6 +168,7 @@ pub(super) const Q_LAMBDA: AgentSpec = AgentSpec {
         let traces = traces(c, setup.n_states * setup.n_actions);
         AnyAgent::tabular(QLambda::new(table(c, setup), traces))
     }),
+    linear: Some(linear::q_lambda),
 };
 
 pub(super) const DYNA_Q: AgentSpec = AgentSpec {
@@ -180,6 +192,7 @@ pub(super) const DYNA_Q: AgentSpec = AgentSpec {
         let stream = Stream::new(setup.seed, "Dyna-Q");
         AnyAgent::tabular(DynaQ::new(table(c, setup), c.int("planning_steps"), stream))
     }),
+    linear: None,
 };
 
 pub(super) const SOFT_Q_LEARNING: AgentSpec = AgentSpec {
@@ -206,4 +219,5 @@ pub(super) const SOFT_Q_LEARNING: AgentSpec = AgentSpec {
             setup.stream,
         ))
     }),
+    linear: None,
 };

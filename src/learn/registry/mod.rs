@@ -4,11 +4,13 @@
 //! A family of agents has a file of its own with a constant per agent, which [`AGENTS`] lists.
 
 mod control;
+mod linear;
 mod monte_carlo;
 mod planners;
 mod prediction;
 mod shared;
 
+pub use self::linear::BuildLinear;
 use super::control::{Advised, Backup};
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
@@ -66,7 +68,12 @@ pub enum Build {
     /// A learner of the state values of a policy that is given.
     Predictor(BuildFn),
     /// A learner of the values of the policy that it plays.
-    OnPolicy(BuildFn),
+    OnPolicy {
+        /// How it is built.
+        build: BuildFn,
+        /// Whether it bootstraps, or waits for whole returns.
+        bootstraps: bool,
+    },
     /// A learner of action values with one-step targets.
     OneStep {
         /// How it is built.
@@ -89,6 +96,8 @@ pub struct AgentSpec {
     pub params: &'static [ParamSpec],
     /// How it is built.
     pub build: Build,
+    /// How it is built where values are linear in features, if it can learn such.
+    pub linear: Option<BuildLinear>,
 }
 
 impl AgentSpec {
@@ -100,10 +109,15 @@ impl AgentSpec {
     /// Whether it takes look-back advice: it learns the values of the policy it plays.
     pub fn is_on_policy(&self) -> bool {
         match self.build {
-            Build::OnPolicy(_) => true,
+            Build::OnPolicy { .. } => true,
             Build::OneStep { backup, .. } => backup != Backup::Best,
             Build::Learner(_) | Build::Predictor(_) | Build::Planner(_) => false,
         }
+    }
+
+    /// Whether it learns from whole returns of the policy that it plays.
+    pub fn learns_from_returns(&self) -> bool {
+        matches!(self.build, Build::OnPolicy { bootstraps: false, .. })
     }
 
     /// The agent as it is with look-ahead advice `phi`, shape `[n_states, n_actions]`; `None` if it

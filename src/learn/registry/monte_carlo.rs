@@ -18,22 +18,26 @@ pub(super) const MONTE_CARLO: AgentSpec = AgentSpec {
     name: "monte_carlo",
     doc: "on-policy Monte Carlo control (Sutton & Barto 5.3, 5.4)",
     params: &[MEAN, GAMMA, EPSILON, EXPLORATION, VISITS, EXPLORING_STARTS, INITIAL_Q],
-    build: Build::Learner(|c, mut setup| {
-        let table = setup.table(c);
-        let agent = MonteCarlo::new(
-            table,
-            c.float("gamma"),
-            c.alpha(),
-            (c.exploration(), c.schedule("epsilon")),
-            Visits::of_word(c.word("visits")),
-            setup.stream,
-        );
-        AnyAgent::tabular(if c.is_on(EXPLORING_STARTS.name) {
-            agent.with_exploring_starts(Stream::new(setup.seed, "first actions"))
-        } else {
-            agent
-        })
-    }),
+    build: Build::OnPolicy {
+        bootstraps: false,
+        build: |c, mut setup| {
+            let table = setup.table(c);
+            let agent = MonteCarlo::new(
+                table,
+                c.float("gamma"),
+                c.alpha(),
+                (c.exploration(), c.schedule("epsilon")),
+                Visits::of_word(c.word("visits")),
+                setup.stream,
+            );
+            AnyAgent::tabular(if c.is_on(EXPLORING_STARTS.name) {
+                agent.with_exploring_starts(Stream::new(setup.seed, "first actions"))
+            } else {
+                agent
+            })
+        },
+    },
+    linear: None,
 };
 
 pub(super) const OFF_POLICY_MONTE_CARLO: AgentSpec = AgentSpec {
@@ -48,4 +52,5 @@ pub(super) const OFF_POLICY_MONTE_CARLO: AgentSpec = AgentSpec {
             setup.stream,
         ))
     }),
+    linear: None,
 };

@@ -32,13 +32,15 @@ pub(super) const VALUE_ITERATION: AgentSpec = AgentSpec {
             max_sweeps: c.int("max_sweeps") as usize,
         })
     }),
+    linear: None,
 };
 
 pub(super) const POLICY_ITERATION: AgentSpec = AgentSpec {
     name: "policy_iteration",
-    doc: "policy iteration on the environment's model, then greedy play (Sutton & Barto 4.3)",
+    doc: "policy iteration with exact evaluation, then greedy play (Sutton & Barto 4.3)",
     params: &[GAMMA],
     build: Build::Planner(|c| Box::new(PolicyIteration { gamma: c.float("gamma") })),
+    linear: None,
 };
 
 pub(super) const RANDOM_AGENT: AgentSpec = AgentSpec {
@@ -47,5 +49,8 @@ pub(super) const RANDOM_AGENT: AgentSpec = AgentSpec {
     params: &[GAMMA],
     build: Build::Learner(|c, setup| {
         AnyAgent::tabular(RandomAgent::new(setup.n_actions, c.float("gamma"), setup.stream))
+    }),
+    linear: Some(|c, setup| {
+        Box::new(RandomAgent::new(setup.n_actions, c.float("gamma"), setup.stream))
     }),
 };

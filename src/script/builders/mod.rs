@@ -2,6 +2,7 @@
 
 mod agents;
 mod discretisers;
+mod features;
 
 use std::rc::Rc;
 
@@ -90,6 +91,7 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     environments(engine, context);
     agents::register(engine, context);
     discretisers::register(engine, context);
+    features::register(engine, context);
     potentials(engine, context);
 }
 

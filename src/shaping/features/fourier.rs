@@ -28,7 +28,7 @@ struct Scaled {
 impl Scaled {
     /// How far along its range the field is, from 0 to 1; NaN counts as the end, as in bins.
     #[inline]
-    fn share(&self, fields: &[f64]) -> f64 {
+    fn place(&self, fields: &[f64]) -> f64 {
         let share = (fields[self.field] - self.lo) / self.range;
         let share = if share < 1.0 { share } else { 1.0 };
         if share > 0.0 { share } else { 0.0 }
@@ -66,6 +66,11 @@ impl Fourier {
         self.shares.len()
     }
 
+    #[inline]
+    pub(super) fn share(&self, feature: usize) -> f64 {
+        self.shares[feature]
+    }
+
     pub(super) fn active(&self) -> Active {
         let n = self.n_features();
         Active { index: (0..n as u32).collect(), value: vec![1.0; n], step: vec![1.0; n] }
@@ -73,16 +78,16 @@ impl Fourier {
 
     #[inline]
     pub(super) fn see(&self, fields: &[f64], active: &mut Active) {
-        let mut shares = [0.0; MAX_FIELDS];
-        for (share, d) in shares.iter_mut().zip(&self.dims) {
-            *share = d.share(fields);
+        let mut places = [0.0; MAX_FIELDS];
+        for (place, d) in places.iter_mut().zip(&self.dims) {
+            *place = d.place(fields);
         }
-        let places = active.value.iter_mut().zip(&mut active.step);
+        let active = active.value.iter_mut().zip(&mut active.step);
         let rows = self.frequencies.chunks_exact(self.dims.len()).zip(&self.shares);
-        for ((value, step), (row, own)) in places.zip(rows) {
+        for ((value, step), (row, own)) in active.zip(rows) {
             let mut angle = 0.0;
-            for (share, frequency) in shares.iter().zip(row) {
-                angle += frequency * share;
+            for (place, frequency) in places.iter().zip(row) {
+                angle += frequency * place;
             }
             *value = cos(angle);
             *step = *value * own;

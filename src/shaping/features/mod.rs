@@ -8,7 +8,7 @@
 mod fourier;
 mod tiles;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use fourier::Fourier;
 pub use tiles::Tiles;
@@ -19,7 +19,7 @@ use super::{BinsError, Dim};
 pub const MAX_WEIGHTS: usize = 1 << 24;
 
 /// The kind of features.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FeatureKind {
     /// Tile coding with so many tilings.
@@ -46,11 +46,6 @@ impl FeatureSpec {
             FeatureKind::Fourier => fourier::n_features(&self.dims),
         }
     }
-
-    /// The field's range, if the features depend on it.
-    pub fn range(&self, field: usize) -> Option<[f64; 2]> {
-        self.dims.iter().find(|d| d.field == field).map(|d| [d.lo, d.hi])
-    }
 }
 
 impl std::fmt::Display for FeatureSpec {
@@ -62,7 +57,12 @@ impl std::fmt::Display for FeatureSpec {
                 let plural = if tilings == 1 { "" } else { "s" };
                 write!(f, "{tilings} tiling{plural} of {} tiles", sizes.join(" × "))?;
             }
-            FeatureKind::Fourier => write!(f, "Fourier basis of order {}", sizes.join(" × "))?,
+            // One order for all.
+            FeatureKind::Fourier => {
+                let (order, n) = (sizes.first().map_or("0", String::as_str), sizes.len());
+                let plural = if n == 1 { "" } else { "s" };
+                write!(f, "Fourier basis of order {order} over {n} field{plural}")?;
+            }
         }
         write!(f, ", {} features", self.n_features().unwrap_or(usize::MAX))
     }
@@ -158,6 +158,15 @@ impl Features {
         match self {
             Self::Tiles(tiles) => tiles.see(fields, active),
             Self::Fourier(fourier) => fourier.see(fields, active),
+        }
+    }
+
+    /// The share of a step size that `feature` gets, above 0.
+    #[inline]
+    pub fn share(&self, feature: usize) -> f64 {
+        match self {
+            Self::Tiles(tiles) => tiles.share(),
+            Self::Fourier(fourier) => fourier.share(feature),
         }
     }
 

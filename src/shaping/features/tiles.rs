@@ -16,8 +16,10 @@ use crate::shaping::Dim;
 pub struct Tiles {
     dims: Vec<TiledDim>,
     n_tilings: usize,
+    /// 1 / m.
+    share: f64,
     /// Tiles of one tiling.
-    n_tiles: usize,
+    per_tiling: usize,
 }
 
 #[derive(Debug, Clone)]
@@ -47,7 +49,7 @@ pub(super) fn n_features(dims: &[Dim], n_tilings: usize) -> Option<usize> {
 impl Tiles {
     /// `dims` has been checked.
     pub(super) fn new(dims: &[Dim], n_tilings: usize) -> Self {
-        let mut n_tiles = 1;
+        let mut per_tiling = 1;
         let mut tiled: Vec<TiledDim> = Vec::with_capacity(dims.len());
         for (j, d) in dims.iter().enumerate().rev() {
             tiled.push(TiledDim {
@@ -55,13 +57,13 @@ impl Tiles {
                 lo: d.lo,
                 per_unit: (d.n * n_tilings) as f64 / (d.hi - d.lo),
                 last: (d.n * n_tilings - 1) as f64,
-                stride: n_tiles,
+                stride: per_tiling,
                 offsets: (0..n_tilings).map(|t| t * (2 * j + 1) % n_tilings).collect(),
             });
-            n_tiles *= d.n + usize::from(n_tilings > 1);
+            per_tiling *= d.n + usize::from(n_tilings > 1);
         }
         tiled.reverse();
-        Self { dims: tiled, n_tilings, n_tiles }
+        Self { dims: tiled, n_tilings, share: 1.0 / n_tilings as f64, per_tiling }
     }
 
     /// Number of tilings, which is how many features are 1 in each state.
@@ -70,20 +72,25 @@ impl Tiles {
     }
 
     pub(super) fn n_features(&self) -> usize {
-        self.n_tilings * self.n_tiles
+        self.n_tilings * self.per_tiling
     }
 
     /// A step is shared among the tilings: α moves the value of the state itself by α times the
     /// error.
+    #[inline]
+    pub(super) fn share(&self) -> f64 {
+        self.share
+    }
+
     pub(super) fn active(&self) -> Active {
         let m = self.n_tilings;
-        Active { index: vec![0; m], value: vec![1.0; m], step: vec![1.0 / m as f64; m] }
+        Active { index: vec![0; m], value: vec![1.0; m], step: vec![self.share; m] }
     }
 
     #[inline]
     pub(super) fn see(&self, fields: &[f64], active: &mut Active) {
         for (t, index) in active.index.iter_mut().enumerate() {
-            *index = (t * self.n_tiles) as u32;
+            *index = (t * self.per_tiling) as u32;
         }
         for d in &self.dims {
             let part = (fields[d.field] - d.lo) * d.per_unit;
