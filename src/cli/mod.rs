@@ -41,9 +41,9 @@ enum Command {
     Exec(exec::Args),
     /// Compile scripts, call every callback on sampled states, print the plan
     Check(check::Args),
-    /// Say of each shaping whether it keeps the optimal policy: the proof, or what goes wrong
+    /// Say whether each shaping keeps the optimal policy, and prove it
     Audit(audit::Args),
-    /// Rank the potentials of a study before anything is trained
+    /// Rank the potentials of a study before training
     Score(score::Args),
     /// List environments, agents, functions, keys or examples
     List(list::Args),

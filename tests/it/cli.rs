@@ -21,7 +21,7 @@ fn exec_writes_every_file_and_a_closing_table() {
     expect_code(&output, 0);
     let table = stdout(&output);
     assert!(table.contains("plain") && table.contains("unshaped"), "{table}");
-    assert!(table.contains("height") && table.contains("not checked"), "{table}");
+    assert!(table.contains("height") && table.contains("not potential-based"), "{table}");
     assert!(stderr(&output).contains("results in"));
 
     let files = contents(&out);
@@ -305,7 +305,7 @@ fn a_closed_pipe_is_no_error() {
 }
 
 #[test]
-fn rewards_without_a_model_are_not_judged_and_drowned_potentials_are_inconclusive() {
+fn rewards_without_a_model_are_tried_and_drowned_potentials_are_inconclusive() {
     let dir = folder();
     let script = r#"
         let plain = experiment(#{
@@ -329,5 +329,8 @@ fn rewards_without_a_model_are_not_judged_and_drowned_potentials_are_inconclusiv
         .iter()
         .map(|v| v["audit"]["verdict"].as_str().unwrap())
         .collect();
-    assert_eq!(verdicts, ["not checked", "not checked", "inconclusive", "policy preserved"]);
+    assert_eq!(
+        verdicts,
+        ["not-potential-based", "inconclusive", "inconclusive", "not-potential-based"]
+    );
 }

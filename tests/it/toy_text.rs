@@ -116,7 +116,7 @@ fn a_dry_taxi_and_blackjack_are_judged_exactly() {
             ]"
         ));
         let verdicts: Vec<_> = results.iter().map(|(_, verdict, _)| *verdict).collect();
-        assert_eq!(verdicts, ["potential-based", "policy changed"], "{env}");
+        assert_eq!(verdicts, ["potential-based", "not-potential-based"], "{env}");
     }
 }
 

@@ -140,13 +140,19 @@ pub(super) fn model<E: Env + Clone + 'static>(
     Ok(())
 }
 
-/// What trajectories say; `why` is the reason for trying them where there would be something better.
-pub(super) fn verdict(found: &Pathwise, why: Option<&str>) -> (AuditVerdict, String) {
+/// What trajectories say. `cut`: whether some reward depends on the time limit, which trajectories
+/// without one do not show. `why` is the reason for trying them where there would be something better.
+pub(super) fn verdict(found: &Pathwise, cut: bool, why: Option<&str>) -> (AuditVerdict, String) {
     let why = why.map_or(String::new(), |why| format!("{why}; "));
     match (&found.violation, found.bound()) {
         (Some(_), _) => (
             AuditVerdict::NotPotentialBased,
             format!("{why}two ways from one state are paid differently"),
+        ),
+        (None, _) if cut => (
+            AuditVerdict::Inconclusive,
+            "the reward depends on `t.truncated`, which ways without a time limit do not show"
+                .into(),
         ),
         (None, Some(bound)) if found.comparisons > 0 => (
             AuditVerdict::NoViolationFound,
@@ -171,7 +177,7 @@ pub(super) fn try_out<E: Env + Clone + 'static>(
 ) -> Result<Audit, Fault> {
     let mut learned = Learned::new(host, variant, env)?;
     let found = pathwise(env, &settings(variant), |env, t| learned.added(env, t))?;
-    let (verdict, basis) = verdict(&found, None);
+    let (verdict, basis) = verdict(&found, learned.depends_on_the_cut, None);
     let gamma = variant.agent.float("gamma");
     let mut asked = ranges(&env.schema());
     if let DiscretiserSpec::Bins(dims) = &variant.discretiser {

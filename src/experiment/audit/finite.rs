@@ -9,7 +9,7 @@ use super::{Audit, AuditVerdict, beyond_states};
 use crate::audit::{
     Advantages, BrokenTask, Critical, Cycle, Expected, Finding, Hacking, NotSsp, Pair, Pathwise,
     PathwiseSettings, Pattern, PolicyChange, Preservation, Scaling, SspCheck, Strict, Unsolved,
-    broken_task, pathwise, pattern, strict,
+    Verdict, broken_task, pathwise, pattern, strict,
 };
 use crate::experiment::assemble::{NotAModelError, learned_model};
 use crate::experiment::shielded::playable;
@@ -130,7 +130,12 @@ pub(super) fn judge<E: Env + Clone + 'static>(
         }
         _ => None,
     };
+    // Where rounding hides whether actions are tied it may hide what is no potential's, too.
+    let nothing = exact.pattern == Pattern::Nothing && beyond_states(variant).is_none();
+    let hidden = compared.as_ref().is_some_and(|c| c.verdict == Verdict::Inconclusive);
     let verdict = match checked.finding {
+        Finding::Holds if nothing => AuditVerdict::Unshaped,
+        Finding::Holds if hidden => AuditVerdict::Inconclusive,
         Finding::Holds => AuditVerdict::PotentialBased,
         Finding::Fails => AuditVerdict::NotPotentialBased,
         Finding::Inconclusive => AuditVerdict::Inconclusive,
@@ -177,6 +182,10 @@ fn basis(
 ) -> String {
     let text = match (unsolved, preserved, verdict) {
         (Some(unsolved), ..) => return unsolved.to_string(),
+        (.., AuditVerdict::Unshaped) if !variant.is_shaped() => {
+            "exact: what is added to the reward is 0 everywhere"
+        }
+        (.., AuditVerdict::Unshaped) => "exact: the potential is 0 everywhere",
         (_, None, _) => "two actions are too close for the numbers to decide",
         (_, Some(false), _) => "exact: the greedy sets differ",
         (_, Some(true), AuditVerdict::PotentialBased) if variant.changes_reward() => {
@@ -201,7 +210,8 @@ fn on_trajectories<E: Env + Clone + 'static>(
     let mut learned = Learned::new(host, variant, env)?;
     let settings = settings(variant);
     let found = pathwise(env, &settings, |env, t| learned.added(env, t))?;
-    let (verdict, basis) = super::continuous::verdict(&found, Some(why));
+    let (verdict, basis) =
+        super::continuous::verdict(&found, learned.depends_on_the_cut, Some(why));
     exact.pathwise = Some(found);
     let mut audit = Audit::new(verdict, None, basis);
     audit.exact = Some(Box::new(exact));

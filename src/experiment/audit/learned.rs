@@ -9,6 +9,9 @@ use crate::shaping::{
     ScriptedCells, StateIndex, Transition, potential_term,
 };
 
+/// Transitions between two of which it is asked what a cut by the time limit changes.
+const PROBE_INTERVAL: u32 = 16;
+
 /// Reward, potential and cells of a variant.
 pub(super) struct Learned<E: Env> {
     reward: AnyReward<E>,
@@ -17,6 +20,9 @@ pub(super) struct Learned<E: Env> {
     clip: Option<[f64; 2]>,
     gamma: f64,
     terms: Vec<f64>,
+    asked: u32,
+    /// Whether a transition was found that is paid differently where the time limit cuts it off.
+    pub(super) depends_on_the_cut: bool,
 }
 
 impl<E: Env + 'static> Learned<E> {
@@ -77,6 +83,8 @@ impl<E: Env + Clone + 'static> Learned<E> {
             clip: variant.clip_reward,
             gamma: variant.agent.float("gamma"),
             terms: vec![0.0; variant.terms.len()],
+            asked: 0,
+            depends_on_the_cut: false,
         })
     }
 
@@ -91,7 +99,13 @@ impl<E: Env + Clone + 'static> Learned<E> {
 
     /// Everything that is added to the native reward.
     pub(super) fn added(&mut self, env: &E, t: &Transition<'_, E::Obs>) -> Result<f64, Fault> {
-        let extra = extra(&mut self.reward, self.clip, &mut self.terms, env, t)?;
+        let mut paid = |t| extra(&mut self.reward, self.clip, &mut self.terms, env, t);
+        let extra = paid(t)?;
+        if self.asked.is_multiple_of(PROBE_INTERVAL) && !t.terminated {
+            let cut = paid(&Transition { truncated: true, ..*t })?;
+            self.depends_on_the_cut |= cut.to_bits() != extra.to_bits();
+        }
+        self.asked = self.asked.wrapping_add(1);
         if matches!(self.potential, AnyPotential::No(_)) {
             return Ok(extra);
         }
