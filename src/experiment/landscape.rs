@@ -7,7 +7,7 @@ use crate::env::{EnvVisitor, Session};
 use crate::learn::{LinearQ, QTable};
 use crate::mdp::{Env, MAX_FIELDS, Schema};
 use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
-use crate::shaping::{Active, Bins, CellFn, Fault, Features, PhiFn};
+use crate::shaping::{ActionSet, Active, Bins, CellFn, Fault, Features, PhiFn, ShieldFn};
 
 /// From a state to the row of the table that stands for it.
 pub(super) enum Locate {
@@ -117,6 +117,7 @@ pub struct Landscape {
     pub states: Option<Vec<ListedState>>,
     /// The features, where there is no table.
     pub features: Option<Features>,
+    shield: Option<ShieldFn>,
     locate: Option<Locate>,
     phi: Option<PhiFn>,
     /// In which episode Φ is taken.
@@ -134,18 +135,33 @@ impl Landscape {
         let env =
             variant.environment().map_err(|e| Diagnostic::error(e.message).maybe_hint(e.hint))?;
         let schema = env.schema();
+        let n_actions = env.n_actions();
         let by_index = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
         let locate = Locate::new(host, variant, &schema);
         let phi = shaped::phi(host, variant, &schema);
         Ok(Self {
             states: by_index.then(|| env.visit(ListStates)),
             on_cell: matches!(locate, Some(Locate::Bins(_))) && variant.potential_on == PhiOn::Cell,
-            schema,
             features: features(variant),
+            shield: variant
+                .allowed
+                .as_ref()
+                .map(|allowed| host.callbacks().shield(allowed, n_actions, &schema)),
+            schema,
             locate,
             phi,
             last_episode: variant.episodes,
         })
+    }
+
+    /// What the shield allows in each state, on environments whose table goes by it; `None` without
+    /// a shield. Everything where it fails, as it may in states that it keeps an episode from.
+    pub fn allowed(&mut self) -> Option<Vec<ActionSet>> {
+        let (shield, states) = (self.shield.as_mut()?, self.states.as_ref()?);
+        let mut allowed = |s: &ListedState| {
+            if s.acts { shield(&s.fields).unwrap_or(ActionSet::ALL) } else { ActionSet::ALL }
+        };
+        Some(states.iter().map(&mut allowed).collect())
     }
 
     /// A state with every field in the middle of its range, 0 where that is unbounded.

@@ -3,7 +3,7 @@
 use crate::learn::planning::Sweep;
 use crate::learn::{LinearQ, QTable};
 use crate::mdp::Ending;
-use crate::shaping::Features;
+use crate::shaping::{ActionSet, Features};
 
 /// One episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,6 +91,19 @@ pub struct Learned {
 }
 
 impl Learned {
+    /// As a shield leaves it that allows `allowed`, one set per state: refused actions are worth −∞.
+    #[must_use]
+    pub fn behind(self, allowed: &[ActionSet]) -> Self {
+        let Self { values: Values::Q(q), experienced } = self else { return self };
+        let n_actions = q.n_actions();
+        let behind = q.values().iter().enumerate().map(|(i, &value)| {
+            let refused = !allowed[i / n_actions].contains(i % n_actions);
+            if refused { f64::NEG_INFINITY } else { value }
+        });
+        let q = QTable::from_values(n_actions, behind.collect());
+        Self { values: Values::Q(q), experienced }
+    }
+
     /// Of weights of `features`: the values at `states`, a row each. Something was learned where it
     /// was of one of the state's features.
     #[must_use]

@@ -32,6 +32,12 @@ pub fn argmax_tol(row: &[f64]) -> Action {
     row.iter().position(|&q| q >= threshold).unwrap_or(0)
 }
 
+/// All actions that are tied with the largest by the tolerance with which [`argmax_tol`] chooses,
+/// in order.
+pub fn tied(row: &[f64]) -> Vec<Action> {
+    (0..row.len()).filter(|&a| is_greedy(row, 0, a)).collect()
+}
+
 /// Whether `action` is within the tie tolerance of the largest value among the actions that `s`
 /// allows.
 #[inline]

@@ -42,7 +42,9 @@ pub use behaviour::{Behaviour, EpsilonGreedy, Exploration, Explore};
 pub use bootstrapped::{Bootstrapped, stability_bound};
 pub use control::{QLearning, Sarsa, td_error};
 pub use episode::Visits;
-pub use greedy::{argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed};
+pub use greedy::{
+    argmax_allowed, argmax_tol, greedy_set, greedy_sets, max_allowed, pick_allowed, tied,
+};
 pub use linear::{LinearLearner, LinearQ, LinearSetup};
 pub use look_back::LookBack;
 pub use monte_carlo::MonteCarlo;

@@ -11,10 +11,10 @@ use serde_json::{Value, json};
 use super::frame::{Axis, Frame, Request, frames};
 use super::stored::StoredError;
 use crate::experiment::{Landscape, Learned, Values};
-use crate::learn::{argmax_tol, greedy_set};
+use crate::learn::{argmax_tol, tied};
 use crate::mdp::{Action, Grid};
 use crate::script::{Host, Variant};
-use crate::shaping::Features;
+use crate::shaping::{ActionSet, Features};
 
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,6 +122,12 @@ impl Tables {
         Self { learned: learned.collect(), seeds: self.seeds.clone() }
     }
 
+    /// As a shield leaves them.
+    fn behind(&self, allowed: &[ActionSet]) -> Self {
+        let learned = self.learned.iter().map(|one| one.clone().behind(allowed));
+        Self { learned: learned.collect(), seeds: self.seeds.clone() }
+    }
+
     /// The mean over the seeds that know a cell of their largest value there.
     fn value(&self, cell: usize) -> Option<f64> {
         let own = self.learned.iter().filter(|l| l.experienced[cell]);
@@ -145,7 +151,7 @@ impl Tables {
     fn actions(&self, cell: usize) -> Vec<Action> {
         match self.learned.as_slice() {
             [Learned { values: Values::Q(q), experienced }] if experienced[cell] => {
-                greedy_set(q.row(cell), q.max(cell).abs())
+                tied(q.row(cell))
             }
             _ => self.action(cell).into_iter().collect(),
         }
@@ -165,6 +171,8 @@ pub fn pictures(
     quantities: &[Quantity],
 ) -> Result<Vec<Picture>, StoredError> {
     let mut landscape = Landscape::new(host, variant)?;
+    let behind = landscape.allowed().map(|allowed| tables.behind(&allowed));
+    let tables = behind.as_ref().unwrap_or(tables);
     let mut pictures = Vec::new();
     let n_cells = tables.learned.first().map_or(0, |one| one.experienced.len());
     let mut learned: Vec<usize> =

@@ -270,6 +270,8 @@ fn a_stored_policy_does_not_play_what_is_refused() {
     assert_eq!(code(&played), 0, "{}", stderr(&played));
     assert!(!stdout(&played).contains("\"action\":1"), "{}", stdout(&played));
     assert!(stdout(&played).contains("\"action\":0"), "{}", stdout(&played));
+    let shown = stdout(&run(&["show", results.to_str().unwrap()]));
+    assert!(shown.contains('←') && !shown.contains('↓'), "{shown}");
 }
 
 /// Every `policy.csv` below `folder`, as rows of numbers by state.
