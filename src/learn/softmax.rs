@@ -10,6 +10,31 @@ use crate::mdp::Action;
 use crate::mdp::math::{exp, ln};
 use crate::mdp::streams::Stream;
 
+/// `exp((Q − max Q) / τ)`
+#[inline]
+pub(super) fn weight(value: f64, best: f64, temperature: f64) -> f64 {
+    // exp(0) without the call: there is one in every row.
+    if value == best { 1.0 } else { exp((value - best) / temperature) }
+}
+
+/// The action that `u` in [0, 1) picks by `weights`, whose sum is `sum`.
+#[inline]
+fn pick(weights: &[f64], sum: f64, u: f64) -> Action {
+    let mut left = u * sum;
+    let mut last = 0;
+    for (a, &weight) in weights.iter().enumerate() {
+        if weight > 0.0 {
+            if left < weight {
+                return a;
+            }
+            left -= weight;
+            last = a;
+        }
+    }
+    // Rounding can leave a little of the sum; it belongs to the last action.
+    last
+}
+
 /// Softmax behaviour. Draws one 64-bit number per choice.
 #[derive(Debug, Clone)]
 pub struct Softmax {
@@ -25,21 +50,20 @@ impl Softmax {
         Self { temperature, stream, weights: vec![0.0; n_actions] }
     }
 
+    /// As [`Explore::choose`] does, by weights that are known already.
+    #[inline]
+    pub(super) fn choose_by(&mut self, weights: &[f64], sum: f64) -> Action {
+        pick(weights, sum, self.stream.uniform())
+    }
+
     /// Weighs the actions that `s` allows; returns the largest value and the sum of the weights.
     #[inline]
     fn weigh<S: Seen>(&mut self, q: &[f64], s: S) -> (f64, f64) {
         let best = max_allowed(q, s);
         let mut sum = 0.0;
-        for (a, (weight, &value)) in self.weights.iter_mut().zip(q).enumerate() {
-            *weight = if !s.allows(a) {
-                0.0
-            } else if value == best {
-                // exp(0), without the call: there is one in every row.
-                1.0
-            } else {
-                exp((value - best) / self.temperature)
-            };
-            sum += *weight;
+        for (a, (w, &value)) in self.weights.iter_mut().zip(q).enumerate() {
+            *w = if s.allows(a) { weight(value, best, self.temperature) } else { 0.0 };
+            sum += *w;
         }
         (best, sum)
     }
@@ -56,19 +80,8 @@ impl Explore for Softmax {
     #[inline]
     fn choose<S: Seen>(&mut self, q: &[f64], s: S) -> Action {
         let (_, sum) = self.weigh(q, s);
-        let mut left = self.stream.uniform() * sum;
-        let mut last = 0;
-        for (a, &weight) in self.weights.iter().enumerate() {
-            if weight > 0.0 {
-                if left < weight {
-                    return a;
-                }
-                left -= weight;
-                last = a;
-            }
-        }
-        // Rounding can leave a little of the sum; it belongs to the last action.
-        last
+        let u = self.stream.uniform();
+        pick(&self.weights, sum, u)
     }
 
     #[inline]
