@@ -15,14 +15,16 @@ use crate::mdp::streams::Stream;
 pub struct Softmax {
     temperature: f64,
     stream: Stream,
-    /// `exp((Q − max Q) / τ)` of each action, 0 for refused ones: scratch space.
+    /// `exp((Q − max Q) / τ)` of each action, 0 for refused ones, of the row last weighed.
     weights: Vec<f64>,
+    /// Their sum.
+    sum: f64,
 }
 
 impl Softmax {
     /// Over `n_actions` actions; `temperature` is in units of the values.
     pub fn new(temperature: f64, n_actions: usize, stream: Stream) -> Self {
-        Self { temperature, stream, weights: vec![0.0; n_actions] }
+        Self { temperature, stream, weights: vec![0.0; n_actions], sum: 0.0 }
     }
 
     /// Weighs the actions that `s` allows; returns the largest value and the sum of the weights.
@@ -41,6 +43,7 @@ impl Softmax {
             };
             sum += *weight;
         }
+        self.sum = sum;
         (best, sum)
     }
 
@@ -50,13 +53,11 @@ impl Softmax {
         let (best, sum) = self.weigh(q, s);
         best + self.temperature * ln(sum)
     }
-}
 
-impl Explore for Softmax {
+    /// Chooses by the weights of the row last weighed, which must not have changed since.
     #[inline]
-    fn choose<S: Seen>(&mut self, q: &[f64], s: S) -> Action {
-        let (_, sum) = self.weigh(q, s);
-        let mut left = self.stream.uniform() * sum;
+    pub(super) fn choose_weighed(&mut self) -> Action {
+        let mut left = self.stream.uniform() * self.sum;
         let mut last = 0;
         for (a, &weight) in self.weights.iter().enumerate() {
             if weight > 0.0 {
@@ -69,6 +70,14 @@ impl Explore for Softmax {
         }
         // Rounding can leave a little of the sum; it belongs to the last action.
         last
+    }
+}
+
+impl Explore for Softmax {
+    #[inline]
+    fn choose<S: Seen>(&mut self, q: &[f64], s: S) -> Action {
+        self.weigh(q, s);
+        self.choose_weighed()
     }
 
     #[inline]

@@ -48,8 +48,14 @@ impl<S: Seen> Learn<S> for SoftQLearning {
 
     fn step(&mut self, reward: f64, next: S) -> Action {
         let value = self.value(next);
+        let updated = self.0.s;
         self.0.update(reward, value);
-        self.begin(next)
+        // The exponentials that V(S′) took are those of the choice, unless the update was of S′.
+        if updated == next.cell() {
+            return self.begin(next);
+        }
+        let a = self.0.behaviour.choose_weighed();
+        self.0.play(next, a)
     }
 
     fn end(&mut self, reward: f64, last: Last<S>) {
@@ -90,6 +96,14 @@ mod tests {
         assert_eq!(a, 1);
         agent.end(10.0, Last::Truncated(Shielded { cell: 1, allowed }));
         assert!((agent.q().unwrap().get(0, 1) - (1.0 + 0.5 * (10.0 - 1.0))).abs() < 1e-15);
+    }
+
+    #[test]
+    fn choices_are_by_the_updated_values() {
+        // From state 1 back to it: the update takes all from the action played.
+        let mut agent = learner(vec![0.0, 0.0, 50.0, 40.0], 0.1);
+        assert_eq!(agent.begin(1), 0);
+        assert_eq!(agent.step(-1000.0, 1), 1);
     }
 
     #[test]
