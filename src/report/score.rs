@@ -160,7 +160,11 @@ fn agreement(
         return None;
     }
     let (scores, areas): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
-    let correlation = spearman(&scores, &areas, 1e-9)?;
+    let Some(correlation) = spearman(&scores, &areas, 1e-9) else {
+        return Some(
+            "  training does not tell them apart: the areas under the curves are equal".into(),
+        );
+    };
     Some(format!(
         "  training ranked {} of them with a correlation of {correlation:.2} (Spearman, VI-AUC \
          against the mean area under the learning curve)",

@@ -16,13 +16,14 @@ pub(super) fn replacement(variant: &Variant, pattern: Pattern, strict: Option<&S
                 rounded(d.gamma)
             );
         }
-        if let Some(c) = d.common() {
-            return format!(
-                "it is a potential's difference with Φ = {} in terminal states, where it must be \
-                 0: give the function as `potential`, and the host sees to that",
-                rounded(c)
-            );
-        }
+        let values = match d.common() {
+            Some(c) => rounded(c),
+            None => "other values than 0".into(),
+        };
+        return format!(
+            "it is a potential's difference with Φ = {values} in terminal states, where it must be \
+             0: give the function as `potential`, and the host sees to that"
+        );
     }
     match pattern {
         Pattern::Nothing => "it adds nothing".into(),

@@ -168,6 +168,14 @@ mod tests {
         assert!((agent.q().unwrap().get(0, 1) - (1.0 + 0.5 * (10.0 - 1.0))).abs() < 1e-15);
     }
 
+    #[test]
+    fn choices_are_by_the_updated_values() {
+        // From state 1 back to it: the update takes all from the action played.
+        let mut agent = learner(vec![0.0, 0.0, 50.0, 40.0], 0.1);
+        assert_eq!(agent.begin(1), 0);
+        assert_eq!(agent.step(-1000.0, 1), 1);
+    }
+
     /// What is kept of each row is what the row says, and behind a shield that allows everything
     /// the same is learned without it.
     #[test]
