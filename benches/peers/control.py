@@ -11,9 +11,7 @@ ratio of steps per second of the training loops; the table shows medians, and th
 largest ratio.
 """
 
-import argparse
 import json
-import os
 import shutil
 import statistics
 import subprocess
@@ -21,7 +19,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from run import HERE, make_python, make_runner
+from run import HERE, arguments, make_python, make_runner, settle
 
 ENVIRONMENTS = {
     "frozen_lake": ('env("FrozenLake-v1", #{ map_name: "8x8" })', 200),
@@ -80,21 +78,12 @@ def runner(program, task, agent, episodes):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--python", help="a Python that has gymnasium and numpy")
-    parser.add_argument("--runner", help="a runner binary")
-    parser.add_argument("--core", type=int, default=0, help="the core to run on")
+    parser = arguments(__doc__.splitlines()[0], rounds=3)
     parser.add_argument("--agent", choices=AGENTS, action="append", help="only this (repeatable)")
-    parser.add_argument("--json", help="also write the numbers here")
     args = parser.parse_args()
     python = args.python or make_python()
     program = args.runner or make_runner()
-    # One core and one thread for both sides.
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {args.core})
-    for library in ("OMP", "OPENBLAS", "MKL"):
-        os.environ[f"{library}_NUM_THREADS"] = "1"
+    settle(args.core)
     print("| agent | task | NumPy, steps/s | runner, steps/s | ratio | (range) |")
     print("|---|---|--:|--:|--:|---|")
     results = []

@@ -107,22 +107,32 @@ def measure(python, program, task, rounds):
     }
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=5)
+def arguments(description, rounds):
+    """A parser of what every comparison can be told."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--rounds", type=int, default=rounds)
     parser.add_argument("--python", help="a Python that has gymnasium and numpy")
     parser.add_argument("--runner", help="a runner binary")
     parser.add_argument("--core", type=int, default=0, help="the core to run on")
-    parser.add_argument("--task", choices=TASKS, action="append", help="only this (repeatable)")
     parser.add_argument("--json", help="also write the numbers here")
+    return parser
+
+
+def settle(core):
+    """One core and one thread for both sides."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {core})
+    for library in ("OMP", "OPENBLAS", "MKL"):
+        os.environ[f"{library}_NUM_THREADS"] = "1"
+
+
+def main():
+    parser = arguments(__doc__.splitlines()[0], rounds=5)
+    parser.add_argument("--task", choices=TASKS, action="append", help="only this (repeatable)")
     args = parser.parse_args()
     python = args.python or make_python()
     program = args.runner or make_runner()
-    # One core and one thread for both sides.
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {args.core})
-    for library in ("OMP", "OPENBLAS", "MKL"):
-        os.environ[f"{library}_NUM_THREADS"] = "1"
+    settle(args.core)
     with tempfile.TemporaryDirectory() as held:
         # A build that ends meanwhile must not swap the binary between two rounds.
         program = shutil.copy2(program, Path(held) / "runner")
