@@ -3,11 +3,12 @@
 
 use std::sync::atomic::AtomicBool;
 
-use runner::experiment::{UnitRecord, run_unit};
+use runner::experiment::{UnitRecord, audit_variant, run_unit};
 use runner::learn::greedy_sets;
 use runner::script::{Host, Plan};
 
 use crate::language::plan_of;
+use crate::support::{expect_code, folder, run as run_command, stdout, stored, write};
 
 /// A script of one study on slippery ice, whose variants are `variants`: maps of keys that differ
 /// from 300 episodes of Q-learning.
@@ -233,6 +234,82 @@ fn what_is_learned_under_a_potential_that_settles() {
         for a in 0..4 {
             let phi = 1.0 - 0.05 * (s / 4 + s % 4) as f64;
             assert!((moving.get(s, a) + phi - plain.get(s, a)).abs() < 1e-9, "{s}, {a}");
+        }
+    }
+}
+
+/// What `check` prints of the kinds, and what the audit says of them.
+#[test]
+fn the_kinds_are_described_and_judged() {
+    let script = r#"
+        let base = experiment(#{ env: "FrozenLake-v1", agent: sarsa(), episodes: 10, seeds: 1 });
+        [
+            base.with(#{ name: "moving", potential: |s, episode| 1.0 / episode }),
+            base.with(#{ name: "shifted", potential_shift: 0.5 }),
+            base.with(#{ name: "advised", advice: |s, a| 0.5 * a }),
+            base.with(#{ name: "back", advice: |s, a| 0.5 * a, advice_on: "look_back" }),
+            base.with(#{ name: "own", potential: learned(0.5) }),
+            base.with(#{ name: "returns", agent: monte_carlo(), advice: |s, a| 0.5 * a,
+                         advice_on: "look_back" }),
+        ]"#;
+    let dir = folder();
+    let path = write(dir.path(), "kinds.rhai", script);
+    let output = run_command(&["check", path.to_str().unwrap()]);
+    expect_code(&output, 0);
+    let text = stdout(&output);
+    for line in [
+        "potential    closure (line 4), of every episode, tabulated over the states",
+        "shift        0.5 added to Φ, except of terminal states",
+        "advice       closure (line 6), looking ahead, choices corrected by it",
+        "advice       closure (line 7), looking back",
+        "potential    0.5 times the agent's own state values",
+    ] {
+        assert!(text.contains(line), "{line} is not in\n{text}");
+    }
+    let plan = plan_of(script, &[]);
+    let host = Host::open(&plan).unwrap();
+    let judged = plan.variants.iter().map(|v| audit_variant(&host, v, None).unwrap());
+    let judged: Vec<_> = judged.map(|a| (a.verdict.as_str(), a.policy_preserved)).collect();
+    let fine = ("potential-based", Some(true));
+    assert_eq!(judged, [fine, fine, fine, ("inconclusive", None), fine, fine]);
+}
+
+/// V as `show` pictures it is that of the environment, whatever the kind.
+#[test]
+fn pictures_undo_the_shaping() {
+    let dir = folder();
+    let results = stored(
+        dir.path(),
+        r#"
+        let base = experiment(#{
+            name: "plain", env: env("FrozenLake-v1", #{ is_slippery: false }), seeds: 1,
+            agent: q_learning(#{ alpha: 0.5, gamma: 0.9, epsilon: 1.0 }), episodes: 4000,
+        });
+        study("kinds", [
+            base,
+            base.with(#{ name: "shifted", potential_shift: -0.5 }),
+            base.with(#{ name: "own", potential: learned(0.4), potential_shift: 2.0 }),
+            base.with(#{ name: "advised", advice: |s, a| 0.5 * a }),
+            base.with(#{ name: "moving", potential: |s, i| s.row * (1.0 + 0.99 ** i) }),
+        ])"#,
+    );
+    let values = |variant: &str| -> Vec<Option<f64>> {
+        let results = results.to_str().unwrap();
+        let output = run_command(&["show", results, "--json", "--value", "--variant", variant]);
+        expect_code(&output, 0);
+        let all: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+        let rows = all["pictures"][0]["rows"].as_array().unwrap().clone();
+        rows.iter().flat_map(|row| row.as_array().unwrap().clone()).map(|x| x.as_f64()).collect()
+    };
+    let plain = values("plain");
+    assert_eq!(plain.iter().flatten().count(), 11, "{plain:?}");
+    for variant in ["shifted", "own", "advised", "moving"] {
+        for (a, b) in values(variant).iter().zip(&plain) {
+            let same = match (a, b) {
+                (Some(a), Some(b)) => (a - b).abs() < 1e-6,
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            assert!(same, "{variant}: {a:?} instead of {b:?}");
         }
     }
 }
