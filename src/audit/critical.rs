@@ -23,7 +23,8 @@ const TURNS: usize = 1_000;
 /// How far the added reward can be scaled before something is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Critical {
-    /// Up to this factor k, what is optimal for R + kF is optimal for R; `None` if for all.
+    /// Below this factor k, what is optimal for R + kF is optimal for R; at k itself there may be
+    /// ties with what is not. `None` if for all.
     pub k: Option<f64>,
     /// Whether F, however small, tells actions apart that are equally good for R: nothing is lost
     /// by that, but the greedy sets are smaller.

@@ -1,5 +1,6 @@
 //! Puts together what a variant describes: discretiser, reward, agent.
 
+use super::endless::refuse_endless;
 use super::predict::{Exact, given_policy};
 use super::shaped::{learner, potential};
 use super::shielded::playable;
@@ -334,6 +335,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let model = learned_model(host, variant, env)?;
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
             let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
+            refuse_endless(variant, &model.shaped, &solution.policy)?;
             let sweeps = solution.sweeps(planner.gamma());
             let agent = AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma()));
             Ok(Assembled { agent, sweeps, exact: None })

@@ -12,6 +12,7 @@
 mod assemble;
 mod audit;
 mod check;
+mod endless;
 mod execute;
 pub mod golden;
 mod landscape;

@@ -1,6 +1,7 @@
 //! What a predictor plays, and the exact values that it should learn.
 
 use super::assemble::{NotAModelError, diagnostic_of, for_each_cell, learned_model, shield};
+use super::endless::refuse_endless;
 use crate::env::EnvVisitor;
 use crate::learn::ParamValue;
 use crate::learn::planning::{Over, Planner, Policy, ValueIteration, policy_value};
@@ -16,13 +17,21 @@ pub(super) fn given_policy<E: Env + Clone + 'static>(
     n_cells: usize,
 ) -> Result<Option<Vec<Action>>, Fault> {
     match variant.agent.params["policy"] {
-        ParamValue::Function => scripted_policy(host, variant, env, n_cells).map(Some),
+        ParamValue::Function => {
+            let policy = scripted_policy(host, variant, env, n_cells)?;
+            let by_state = matches!(variant.discretiser, DiscretiserSpec::StateIndex);
+            if let Some(mdp) = env.finite().filter(|_| by_state) {
+                refuse_endless(variant, mdp, &policy)?;
+            }
+            Ok(Some(policy))
+        }
         ParamValue::Word("greedy") => {
             let model = learned_model(host, variant, env)?;
             let gamma = variant.agent.float("gamma");
             let planner = ValueIteration { gamma, theta: 1e-12, max_sweeps: 100_000 };
             let v0: Vec<f64> = model.phi.iter().map(|phi| -phi).collect();
             let solution = planner.solve(&model.shaped, &v0).map_err(|e| Fault(Box::new(e)))?;
+            refuse_endless(variant, &model.shaped, &solution.policy)?;
             Ok(Some(solution.policy))
         }
         _ => Ok(None),

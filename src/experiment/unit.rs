@@ -12,7 +12,7 @@ use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
 use crate::learn::planning::Sweep;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
-use crate::learn::{AnyAgent, Learn};
+use crate::learn::{AnyAgent, Learn, QTable};
 use crate::mdp::Env;
 use crate::mdp::numpy::NumpyRng;
 use crate::script::{Diagnostic, DiscretiserSpec, Host, Plan, Variant};
@@ -72,6 +72,14 @@ impl UnitError {
     fn fault(variant: &Variant, seed: u64, fault: Fault) -> Self {
         let d = assemble::diagnostic_of(fault);
         Self::Script(Box::new(d.note(format!("in variant `{}`, seed {seed}", variant.name))))
+    }
+
+    /// What was learned is no finite number.
+    fn diverged(variant: &Variant, seed: u64) -> Self {
+        let d = Diagnostic::error("the learner diverged: what it has learned is not finite")
+            .at(variant.place.clone())
+            .hint("a smaller `alpha`, shorter traces or gamma < 1 keep values bounded");
+        Self::fault(variant, seed, Fault(Box::new(d)))
     }
 
     /// Episodes are counted from 1, as in `episodes.csv`, steps from 0, as in `t.step`.
@@ -285,6 +293,10 @@ impl RunUnit<'_> {
         .map_err(|e| UnitError::train(variant, seed, e))?;
         let weights = agent.weights().cloned();
         let q = agent.q().cloned();
+        let learned = [&weights, &q].into_iter().flatten().flat_map(QTable::values);
+        if !learned.chain(agent.v().unwrap_or_default()).all(|x| x.is_finite()) {
+            return Err(UnitError::diverged(variant, seed));
+        }
         let values = agent.v().filter(|_| q.is_none()).map(|v| StateValues {
             v: v.to_vec(),
             exact: exact.map_or_else(Vec::new, |exact| exact.v),

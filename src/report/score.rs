@@ -149,8 +149,17 @@ fn agreement(
     let auc = |name: &str| {
         summaries.iter().find(|s| s["name"] == name).and_then(|s| s["auc"]["mean"].as_f64())
     };
+    // Learning curves speak of potentials only where the learner is the same.
+    let learner = |&i: &usize| {
+        let identity = plan.variants[i].identity();
+        [identity["agent"].clone(), identity["params"].clone()]
+    };
+    let alike = |i: &usize| group.iter().filter(|&j| learner(i) == learner(j)).count();
+    let most = group.iter().max_by_key(|i| (alike(i), std::cmp::Reverse(**i)))?;
+    let own = learner(most);
     let pairs: Vec<(f64, f64)> = group
         .iter()
+        .filter(|i| learner(i) == own)
         .filter_map(|&i| {
             let scored = outcomes[i].as_ref().ok()?;
             Some((scored.score.vi_value, auc(&plan.variants[i].name)?))

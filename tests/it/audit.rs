@@ -256,3 +256,22 @@ fn potentials_are_ranked_before_training_and_compared_with_it_afterwards() {
     let text = stdout(&score(&["--results", out.to_str().unwrap()]));
     assert!(text.contains("training ranked 3 of them"), "{text}");
 }
+
+#[test]
+fn what_the_agent_adds_itself_is_in_no_model() {
+    let v = one(&format!("{LAKE}, advice: |s, a| 0.1 * a"));
+    assert_eq!(v["verdict"], "potential-based");
+    assert!(v["transitions"].is_null() && v["pattern"].is_null(), "nothing of that was checked");
+    let dir = folder();
+    let script = format!(
+        "experiment(#{{ {LAKE}, advice: |s, a| if s.index == 9 {{ 0.0 / 0.0 }} else {{ 1.0 }} }})"
+    );
+    let path = write(dir.path(), "nan.rhai", &script);
+    let output = runner().arg("audit").arg(&path).output().unwrap();
+    expect_code(&output, 2);
+    assert!(stderr(&output).contains("finite number"), "{}", stderr(&output));
+    // A multiple of the native reward needs no replacement.
+    let v = one(&format!("{LAKE}, reward: |t| 10.0 * t.reward"));
+    assert_eq!(v["policy_preserved"], true);
+    assert!(v["instead"].as_str().unwrap().starts_with("nothing"), "{}", v["instead"]);
+}

@@ -143,7 +143,7 @@ pub(super) fn judge<E: Env + Clone + 'static>(
     let basis = basis(variant, verdict, preserved, pair.as_ref().err());
     let mut audit = Audit::new(verdict, preserved, basis);
     if verdict == AuditVerdict::NotPotentialBased {
-        audit.instead = Some(replacement(variant, exact.pattern, Some(&checked)));
+        audit.instead = Some(replacement(variant, exact.pattern, &checked, exact.scaling.as_ref()));
         exact.broken_task = broken_task(mdp, &dynamics, &f, gamma).ok().flatten();
     }
     if let Err(Unsolved::Learned(SspCheck::NotSsp {

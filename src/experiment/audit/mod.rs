@@ -9,7 +9,7 @@ mod replacement;
 
 use serde::Serialize;
 
-use super::assemble::diagnostic_of;
+use super::assemble::{diagnostic_of, of_action};
 use crate::audit::{Critical, Pathwise, Preservation};
 use crate::env::EnvVisitor;
 use crate::mdp::Env;
@@ -205,6 +205,17 @@ impl Judge<'_> {
             variant.discretiser,
             DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_)
         );
+        if let Some(advice) = &variant.shaping.advice {
+            // A value that is no number is a mistake here as well.
+            let n_cells = env.n_states().unwrap_or(0);
+            if n_cells > 0 && on_states {
+                of_action(host, variant, env, n_cells, advice, "the advice")?;
+            }
+        }
+        // What the agent adds itself is in no model of the reward.
+        if beyond_states(variant).is_some() && !variant.changes_reward() && !variant.is_dynamic() {
+            return Ok(by_construction(variant));
+        }
         if on_states && variant.frame_skip == 1 && env.finite().is_some() {
             return finite::judge(host, variant, env);
         }

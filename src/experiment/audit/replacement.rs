@@ -1,11 +1,23 @@
 //! What a potential could do in the place of a term that is none.
 
-use crate::audit::{Pattern, Strict};
+use crate::audit::{Finding, Pattern, Scaling, Strict};
 use crate::script::Variant;
 
 /// Advice on a shaping that is not potential-based.
-pub(super) fn replacement(variant: &Variant, pattern: Pattern, strict: Option<&Strict>) -> String {
-    let diagnosis = strict.and_then(|s| s.diagnosis.as_ref());
+pub(super) fn replacement(
+    variant: &Variant,
+    pattern: Pattern,
+    strict: &Strict,
+    scaling: Option<&Scaling>,
+) -> String {
+    if scaling.is_some_and(|s| s.finding == Finding::Holds) {
+        return "nothing: a positive multiple of the native reward has the same optimal policies"
+            .into();
+    }
+    // A term that only the endings have is part of the task, whatever potential would explain it; so
+    // is one that is the same everywhere.
+    let plain = matches!(pattern, Pattern::AtTheEnd | Pattern::Constant);
+    let diagnosis = strict.diagnosis.as_ref().filter(|_| !plain);
     let gamma = variant.agent.float("gamma");
     if let Some(d) = diagnosis {
         let other_gamma = (d.gamma - gamma).abs() > 1e-12;

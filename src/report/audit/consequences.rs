@@ -59,9 +59,9 @@ pub(super) fn consequences(exact: &Exact, lines: &mut Lines) {
     }
     if let Some(critical) = &exact.critical {
         let size = match critical.k {
-            None => "nothing is lost however large the term is".to_string(),
-            Some(k) if k <= 0.0 => "something is lost however small the term is".to_string(),
-            Some(k) => format!("nothing is lost up to {} times the term", short(k)),
+            None => "nothing is lost however large it is".to_string(),
+            Some(k) if k <= 0.0 => "something is lost however small it is".to_string(),
+            Some(k) => format!("nothing is lost below {} times what is added", short(k)),
         };
         let ties = if critical.breaks_ties {
             "; it tells actions apart that are equally good, however small it is"
@@ -91,7 +91,9 @@ pub(super) fn consequences(exact: &Exact, lines: &mut Lines) {
             ),
         );
     }
-    if let Some(task) = exact.broken_task.as_ref().filter(|_| exact.hacking.is_none()) {
+    if let Some(task) =
+        exact.broken_task.as_ref().filter(|_| exact.hacking.is_none() && !harmless(exact))
+    {
         lines.item(
             "would break",
             &format!(
@@ -105,6 +107,11 @@ pub(super) fn consequences(exact: &Exact, lines: &mut Lines) {
             ),
         );
     }
+}
+
+/// Whether the learned reward is a multiple of the native one.
+fn harmless(exact: &Exact) -> bool {
+    matches!(exact.scaling, Some(Scaling { finding: Finding::Holds, .. }))
 }
 
 /// One turn of a loop, and what it brings.
