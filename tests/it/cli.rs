@@ -334,3 +334,34 @@ fn rewards_without_a_model_are_tried_and_drowned_potentials_are_inconclusive() {
         ["not-potential-based", "inconclusive", "inconclusive", "not-potential-based"]
     );
 }
+
+#[test]
+fn learners_that_diverge_and_policies_that_never_end_are_stopped() {
+    let dir = folder();
+    let exec = |name: &str, keys: &str| {
+        let script =
+            format!("experiment(#{{ name: \"{name}\", episodes: 500, seeds: 1, {keys} }})");
+        let path = write(dir.path(), &format!("{name}.rhai"), &script);
+        exec(&path, &dir.path().join(name), &[])
+    };
+    for (name, keys, message) in [
+        (
+            "diverges",
+            "env: \"CliffWalking-v1\", max_steps: 500, agent: sarsa_lambda(#{ alpha: 1.0, \
+             gamma: 1.0, lambda: 1.0, epsilon: 0.1, trace_cutoff: 0.0 })",
+            "the learner diverged",
+        ),
+        (
+            "planned",
+            "env: \"CliffWalking-v1\", agent: value_iteration(#{ gamma: 0.9 }), \
+             allowed: |s, a| a == 0 || a == 1",
+            "may never end",
+        ),
+        ("given", "env: \"CliffWalking-v1\", agent: td0(#{ policy: |s| 0 })", "may never end"),
+    ] {
+        let output = run(name, keys);
+        expect_code(&output, 2);
+        assert!(stderr(&output).contains(message), "{name}: {}", stderr(&output));
+        assert!(stderr(&output).contains(&format!("variant `{name}`")), "{}", stderr(&output));
+    }
+}
