@@ -338,7 +338,7 @@ fn rewards_without_a_model_are_tried_and_drowned_potentials_are_inconclusive() {
 #[test]
 fn learners_that_diverge_and_policies_that_never_end_are_stopped() {
     let dir = folder();
-    let exec = |name: &str, keys: &str| {
+    let trained = |name: &str, keys: &str| {
         let script =
             format!("experiment(#{{ name: \"{name}\", episodes: 500, seeds: 1, {keys} }})");
         let path = write(dir.path(), &format!("{name}.rhai"), &script);
@@ -359,7 +359,7 @@ fn learners_that_diverge_and_policies_that_never_end_are_stopped() {
         ),
         ("given", "env: \"CliffWalking-v1\", agent: td0(#{ policy: |s| 0 })", "may never end"),
     ] {
-        let output = run(name, keys);
+        let output = trained(name, keys);
         expect_code(&output, 2);
         assert!(stderr(&output).contains(message), "{name}: {}", stderr(&output));
         assert!(stderr(&output).contains(&format!("variant `{name}`")), "{}", stderr(&output));
