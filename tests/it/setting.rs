@@ -147,7 +147,7 @@ fn clipping_changes_what_is_learned_but_not_what_is_reported() {
         |plan: &Plan| audit_variant(&Host::open(plan).unwrap(), only(plan), None).unwrap().label();
     assert_eq!(verdict(&lake("")), "unshaped");
     assert_eq!(verdict(&lake(", clip_reward: [-5, 1]")), "unshaped");
-    assert_eq!(verdict(&lake(", clip_reward: [0, 1]")), "policy changed");
+    assert_eq!(verdict(&lake(", clip_reward: [0, 1]")), "policy changed (2)");
 }
 
 #[test]
