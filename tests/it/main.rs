@@ -2,6 +2,7 @@
 
 mod audit;
 mod blackjack;
+mod book_control;
 mod book_figures;
 mod cli;
 mod crash;

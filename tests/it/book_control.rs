@@ -1,0 +1,196 @@
+//! Figures and examples of Sutton & Barto (2018) that concern control, and what is known of Taxi.
+//! Each asserts what the figure is there to show, over enough runs to be sure of it.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use runner::env::{AnyEnv, make};
+use runner::experiment::{Limits, World, train};
+use runner::learn::registry::{AGENTS, Setup, TabularAgent};
+use runner::learn::{Agent, AgentConfig, ParamValue, QTable, Schedule, Unit, argmax_tol};
+use runner::mdp::numpy::NumpyRng;
+use runner::mdp::streams::Stream;
+use runner::mdp::{Action, Env, FiniteEnv, FiniteMdp, FiniteState, Outcome, Schema, Step};
+use runner::shaping::{NativeReward, NoPotential, StateIndex};
+
+use crate::support::build_of;
+
+/// A task given by its table.
+#[derive(Clone)]
+struct Task(FiniteEnv);
+
+impl Task {
+    fn new(table: &[Vec<Vec<Outcome>>], start: usize) -> Self {
+        let mut initial = vec![0.0; table.len()];
+        initial[start] = 1.0;
+        Self(FiniteEnv::new(Arc::new(FiniteMdp::new(table, initial).unwrap())))
+    }
+}
+
+impl Env for Task {
+    type Obs = FiniteState;
+
+    const INDEXED: bool = true;
+
+    fn n_actions(&self) -> usize {
+        self.0.mdp().n_actions()
+    }
+
+    fn reset(&mut self, rng: &mut NumpyRng) -> FiniteState {
+        self.0.reset(rng)
+    }
+
+    fn step(&mut self, action: Action, rng: &mut NumpyRng) -> Step<FiniteState> {
+        let (obs, outcome) = self.0.step(action, rng);
+        Step { obs, reward: outcome.reward, terminated: outcome.terminated }
+    }
+
+    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
+        Some(self.0.mdp())
+    }
+
+    fn state_index(&self, obs: &FiniteState) -> Option<usize> {
+        Some(obs.index as usize)
+    }
+
+    fn schema(&self) -> Schema {
+        Schema { fields: Vec::new(), facts: Vec::new(), actions: Vec::new(), grid: None }
+    }
+
+    fn fields(&self, _obs: &FiniteState, _out: &mut [f64]) {}
+}
+
+fn rate(x: f64) -> ParamValue {
+    ParamValue::Schedule(Schedule::constant(x))
+}
+
+/// The agent called `name` with these parameters, for a task of this shape.
+fn agent(
+    name: &str,
+    params: &[(&'static str, ParamValue)],
+    [n_states, n_actions]: [usize; 2],
+    seed: u64,
+) -> Box<dyn TabularAgent> {
+    let spec = AGENTS.iter().find(|spec| spec.name == name).unwrap();
+    let mut config = AgentConfig::new(spec);
+    for (key, value) in params {
+        assert!(config.params.insert(key, *value).is_some(), "{name} has {key}");
+    }
+    let stream = Stream::new(seed, "agent");
+    let (initial_q, initial_v, policy) = (None, None, None);
+    let setup = Setup { n_states, n_actions, seed, stream, initial_q, initial_v, policy };
+    build_of(spec).unwrap()(&config, setup).boxed()
+}
+
+/// Trains; steps and return of every episode, and the table.
+fn run<E: Env>(
+    env: E,
+    mut agent: Box<dyn TabularAgent>,
+    (episodes, max_steps): (u32, Option<u32>),
+    seed: u64,
+) -> (Vec<(u32, f64)>, QTable) {
+    let discretiser = StateIndex { n_states: env.n_states().unwrap() };
+    let mut world = World { env, discretiser, potential: NoPotential, reward: NativeReward };
+    let limits = Limits { episodes, max_steps, ..Limits::EPISODE };
+    let mut rows = Vec::new();
+    let (mut rng, stop) = (NumpyRng::from_u64(seed), AtomicBool::new(false));
+    let trained = train(&mut world, &mut agent, limits, &mut rng, &stop, |row, _| {
+        rows.push((row.steps, row.native));
+    });
+    assert!(trained.is_ok());
+    (rows, agent.q().unwrap().clone())
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
+    sum / n
+}
+
+/// The states of the greedy path from `start`, to the end or until it has gone on for too long.
+fn greedy_path(mdp: &FiniteMdp, q: &QTable, start: usize) -> (Vec<usize>, bool) {
+    let mut path = vec![start];
+    while path.len() < 100 {
+        let s = path[path.len() - 1];
+        let o = mdp.of(s, argmax_tol(q.row(s)))[0];
+        path.push(o.next_state as usize);
+        if o.terminated {
+            return (path, true);
+        }
+    }
+    (path, false)
+}
+
+#[test]
+fn example_6_6_the_cliff() {
+    let AnyEnv::CliffWalking(env) = make("CliffWalking-v1", &serde_json::Map::new()).unwrap()
+    else {
+        unreachable!("the id says so")
+    };
+    let params = [("alpha", rate(0.5)), ("gamma", ParamValue::Float(1.0)), ("epsilon", rate(0.1))];
+    let mdp = env.finite().unwrap().clone();
+    let learned = |name: &str| -> Vec<(f64, Vec<usize>, bool)> {
+        (0..50)
+            .map(|seed| {
+                let agent = agent(name, &params, [48, 4], seed);
+                let (rows, q) = run(env.clone(), agent, (500, None), seed);
+                let online = mean(rows[400..].iter().map(|row| row.1));
+                let (path, ended) = greedy_path(&mdp, &q, 36);
+                (online, path, ended)
+            })
+            .collect()
+    };
+    let (q_learning, sarsa) = (learned("q_learning"), learned("sarsa"));
+    let online = |runs: &[(f64, Vec<usize>, bool)]| mean(runs.iter().map(|run| run.0));
+    // The figure: about -25 against -50.
+    assert!(online(&sarsa) > -32.0, "{}", online(&sarsa));
+    assert!(online(&q_learning) < -40.0, "{}", online(&q_learning));
+    // Q-learning finds the shortest path, 13 steps along the edge; SARSA keeps its distance.
+    let edge = q_learning.iter().filter(|(_, path, ended)| *ended && path.len() == 14).count();
+    assert!(edge >= 45, "{edge} of 50");
+    let top = |path: &[usize]| path.iter().map(|s| s / 12).min();
+    let safe = sarsa.iter().filter(|(_, path, _)| top(path) <= Some(1)).count();
+    assert!(safe >= 45, "{safe} of 50");
+}
+
+#[test]
+fn example_6_7_maximisation_bias() {
+    let out =
+        |probability, reward| Outcome { probability, next_state: 0, reward, terminated: true };
+    let to_b = Outcome { probability: 1.0, next_state: 1, reward: 0.0, terminated: false };
+    // A: half of the actions end the episode for nothing, half lead to B; B: whatever is done ends
+    // it for -0.1 on average, with a standard deviation of 1.
+    let a = (0..10).map(|i| if i < 5 { vec![out(1.0, 0.0)] } else { vec![to_b] }).collect();
+    let b = (0..10).map(|_| vec![out(0.5, -1.1), out(0.5, 0.9)]).collect();
+    let task = Task::new(&[a, b], 0);
+    let params = [("alpha", rate(0.1)), ("gamma", ParamValue::Float(1.0)), ("epsilon", rate(0.1))];
+    // The share of episodes that go by B, which takes a step more; 5 % would be best.
+    let by_b = |name: &str| {
+        mean((0..500).map(|seed| {
+            let (rows, _) =
+                run(task.clone(), agent(name, &params, [2, 10], seed), (100, None), seed);
+            mean(rows.iter().map(|row| f64::from(row.0 - 1)))
+        }))
+    };
+    let (single, double) = (by_b("q_learning"), by_b("double_q_learning"));
+    assert!(single > 0.3, "{single}");
+    assert!(double < 0.2, "{double}");
+}
+
+#[test]
+fn taxi_reaches_about_8() {
+    let AnyEnv::Taxi(env) = make("Taxi-v4", &serde_json::Map::new()).unwrap() else {
+        unreachable!("the id says so")
+    };
+    let fading = Schedule::Exponential { start: 0.3, factor: 0.995, min: 0.0, unit: Unit::Episode };
+    let params = [("alpha", rate(0.5)), ("epsilon", ParamValue::Schedule(fading))];
+    let returns: Vec<f64> = (0..10)
+        .map(|seed| {
+            let agent = agent("q_learning", &params, [500, 6], seed);
+            let (rows, _) = run(env.clone(), agent, (3000, Some(200)), seed);
+            mean(rows[2500..].iter().map(|row| row.1))
+        })
+        .collect();
+    // The optimum is 7.9 on average over the starts.
+    assert!(mean(returns.iter().copied()) > 7.6, "{returns:?}");
+    assert!(returns.iter().all(|x| (6.5..8.5).contains(x)), "{returns:?}");
+}
