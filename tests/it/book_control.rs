@@ -68,8 +68,19 @@ fn rate(x: f64) -> ParamValue {
 fn agent(
     name: &str,
     params: &[(&'static str, ParamValue)],
+    shape: [usize; 2],
+    seed: u64,
+) -> Box<dyn TabularAgent> {
+    agent_from(name, params, shape, seed, None)
+}
+
+/// The same with these initial values.
+fn agent_from(
+    name: &str,
+    params: &[(&'static str, ParamValue)],
     [n_states, n_actions]: [usize; 2],
     seed: u64,
+    initial_q: Option<Vec<f64>>,
 ) -> Box<dyn TabularAgent> {
     let spec = AGENTS.iter().find(|spec| spec.name == name).unwrap();
     let mut config = AgentConfig::new(spec);
@@ -77,7 +88,7 @@ fn agent(
         assert!(config.params.insert(key, *value).is_some(), "{name} has {key}");
     }
     let stream = Stream::new(seed, "agent");
-    let (initial_q, initial_v, policy) = (None, None, None);
+    let (initial_v, policy) = (None, None);
     let setup = Setup { n_states, n_actions, seed, stream, initial_q, initial_v, policy };
     build_of(spec).unwrap()(&config, setup).boxed()
 }
@@ -174,6 +185,61 @@ fn example_6_7_maximisation_bias() {
     let (single, double) = (by_b("q_learning"), by_b("double_q_learning"));
     assert!(single > 0.3, "{single}");
     assert!(double < 0.2, "{double}");
+}
+
+#[test]
+fn figure_8_2_planning_in_the_dyna_maze() {
+    const MAZE: [&[u8]; 6] =
+        [b".......#G", b"..#....#.", b"S.#....#.", b"..#......", b".....#...", b"........."];
+    let free = |r: i32, c: i32| {
+        (0..6).contains(&r) && (0..9).contains(&c) && MAZE[r as usize][c as usize] != b'#'
+    };
+    let table: Vec<Vec<Vec<Outcome>>> = (0..54)
+        .map(|s: i32| {
+            let moves = [(-1, 0), (1, 0), (0, -1), (0, 1)];
+            let go = |(dr, dc): (i32, i32)| {
+                let (r, c) = (s / 9 + dr, s % 9 + dc);
+                let next = if free(r, c) { r * 9 + c } else { s };
+                let goal = next == 8;
+                let reward = f64::from(u8::from(goal));
+                vec![Outcome {
+                    probability: 1.0,
+                    next_state: next as u32,
+                    reward,
+                    terminated: goal,
+                }]
+            };
+            moves.into_iter().map(go).collect()
+        })
+        .collect();
+    let maze = Task::new(&table, 18);
+    // The mean number of steps of each episode, over 30 runs as in the figure, which breaks ties at
+    // random; here initial values that differ a little do, high enough not to fade before the goal
+    // is found.
+    let steps = |n: u64| -> Vec<f64> {
+        let params = [
+            ("alpha", rate(0.1)),
+            ("gamma", ParamValue::Float(0.95)),
+            ("epsilon", rate(0.1)),
+            ("planning_steps", ParamValue::Int(n)),
+        ];
+        let runs: Vec<_> = (0..30)
+            .map(|seed| {
+                let mut ties = Stream::new(seed, "ties");
+                let initial = (0..54 * 4).map(|_| 0.1 + 1e-3 * ties.uniform()).collect();
+                let agent = agent_from("dyna_q", &params, [54, 4], seed, Some(initial));
+                run(maze.clone(), agent, (50, Some(20_000)), seed).0
+            })
+            .collect();
+        (0..50).map(|i| mean(runs.iter().map(|rows| f64::from(rows[i].0)))).collect()
+    };
+    let [none, five, fifty] = [0, 5, 50].map(steps);
+    let shown = format!("{none:.0?}\n{five:.0?}\n{fifty:.0?}");
+    // In the second episode already, and far apart.
+    assert!(fifty[1] < 0.7 * five[1] && five[1] < 0.7 * none[1], "{shown}");
+    // A few episodes of planning are enough; without it takes some 25.
+    assert!(fifty[4] < 30.0 && five[9] < 40.0 && none[9] > 2.0 * five[9], "{shown}");
+    assert!(none[45] < 40.0, "{shown}");
 }
 
 #[test]
