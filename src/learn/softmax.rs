@@ -7,91 +7,90 @@ use super::Seen;
 use super::behaviour::Explore;
 use super::greedy::max_allowed;
 use crate::mdp::Action;
-use crate::mdp::math::{exp, ln};
+use crate::mdp::math::{exp, ln_1p};
 use crate::mdp::streams::Stream;
-
-/// `exp((Q − max Q) / τ)`
-#[inline]
-pub(super) fn weight(value: f64, best: f64, temperature: f64) -> f64 {
-    // exp(0) without the call: there is one in every row.
-    if value == best { 1.0 } else { exp((value - best) / temperature) }
-}
-
-/// The action that `u` in [0, 1) picks by `weights`, whose sum is `sum`.
-#[inline]
-fn pick(weights: &[f64], sum: f64, u: f64) -> Action {
-    let mut left = u * sum;
-    let mut last = 0;
-    for (a, &weight) in weights.iter().enumerate() {
-        if weight > 0.0 {
-            if left < weight {
-                return a;
-            }
-            left -= weight;
-            last = a;
-        }
-    }
-    // Rounding can leave a little of the sum; it belongs to the last action.
-    last
-}
 
 /// Softmax behaviour. Draws one 64-bit number per choice.
 #[derive(Debug, Clone)]
 pub struct Softmax {
     temperature: f64,
     stream: Stream,
-    /// `exp((Q − max Q) / τ)` of each action, 0 for refused ones: scratch space.
+    /// `exp((Q − max Q) / τ)` of each action, 0 for refused ones, of the row last weighed.
     weights: Vec<f64>,
+    /// Their sum.
+    sum: f64,
 }
 
 impl Softmax {
     /// Over `n_actions` actions; `temperature` is in units of the values.
     pub fn new(temperature: f64, n_actions: usize, stream: Stream) -> Self {
-        Self { temperature, stream, weights: vec![0.0; n_actions] }
+        Self { temperature, stream, weights: vec![0.0; n_actions], sum: 0.0 }
     }
 
-    /// As [`Explore::choose`] does, by weights that are known already.
-    #[inline]
-    pub(super) fn choose_by(&mut self, weights: &[f64], sum: f64) -> Action {
-        pick(weights, sum, self.stream.uniform())
-    }
-
-    /// Weighs the actions that `s` allows; returns the largest value and the sum of the weights.
+    /// Weighs the actions that `s` allows; returns the largest value, whose weight is 1, and the sum
+    /// of the other weights.
     #[inline]
     fn weigh<S: Seen>(&mut self, q: &[f64], s: S) -> (f64, f64) {
         let best = max_allowed(q, s);
-        let mut sum = 0.0;
-        for (a, (w, &value)) in self.weights.iter_mut().zip(q).enumerate() {
-            *w = if s.allows(a) { weight(value, best, self.temperature) } else { 0.0 };
-            sum += *w;
+        let (mut others, mut found) = (0.0, false);
+        for (a, (weight, &value)) in self.weights.iter_mut().zip(q).enumerate() {
+            if !s.allows(a) {
+                *weight = 0.0;
+            } else if value == best && !found {
+                // exp(0), without the call: there is one in every row.
+                (*weight, found) = (1.0, true);
+            } else {
+                *weight = exp((value - best) / self.temperature);
+                others += *weight;
+            }
         }
-        (best, sum)
+        self.sum = 1.0 + others;
+        (best, others)
     }
 
     /// `τ ln Σ_a exp(Q(s, a) / τ)`, over the actions that `s` allows.
     #[inline]
     pub(super) fn log_sum_exp<S: Seen>(&mut self, q: &[f64], s: S) -> f64 {
-        let (best, sum) = self.weigh(q, s);
-        best + self.temperature * ln(sum)
+        let (best, others) = self.weigh(q, s);
+        // Not ln (1 + …): where one action outweighs the others that loses them, and close to 1 the
+        // correctly rounded ln takes twenty times as long.
+        best + self.temperature * ln_1p(others)
+    }
+
+    /// Chooses by the weights of the row last weighed, which must not have changed since.
+    #[inline]
+    pub(super) fn choose_weighed(&mut self) -> Action {
+        let mut left = self.stream.uniform() * self.sum;
+        let mut last = 0;
+        for (a, &weight) in self.weights.iter().enumerate() {
+            if weight > 0.0 {
+                if left < weight {
+                    return a;
+                }
+                left -= weight;
+                last = a;
+            }
+        }
+        // Rounding can leave a little of the sum; it belongs to the last action.
+        last
     }
 }
 
 impl Explore for Softmax {
     #[inline]
     fn choose<S: Seen>(&mut self, q: &[f64], s: S) -> Action {
-        let (_, sum) = self.weigh(q, s);
-        let u = self.stream.uniform();
-        pick(&self.weights, sum, u)
+        self.weigh(q, s);
+        self.choose_weighed()
     }
 
     #[inline]
     fn mean<S: Seen>(&mut self, q: &[f64], s: S, x: &[f64]) -> f64 {
-        let (_, sum) = self.weigh(q, s);
+        self.weigh(q, s);
         // From the differences, so that a value of 10⁹ costs the small ones nothing.
         let best = self.weights.iter().zip(x).find(|(weight, _)| **weight == 1.0);
         let best = best.map_or(0.0, |(_, x)| *x);
         let weighted = self.weights.iter().zip(x).filter(|(weight, _)| **weight > 0.0);
-        best + weighted.map(|(weight, x)| weight * (x - best)).sum::<f64>() / sum
+        best + weighted.map(|(weight, x)| weight * (x - best)).sum::<f64>() / self.sum
     }
 
     fn epsilon(&self) -> f64 {
@@ -104,6 +103,7 @@ impl Explore for Softmax {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mdp::math::ln;
     use crate::shaping::{ActionSet, Shielded};
 
     fn softmax(temperature: f64) -> Softmax {
@@ -131,6 +131,13 @@ mod tests {
         assert!((policy.expected(&row(), 0) - expected).abs() < 1e-15);
         // 0.5 ln (1 + 2 + 5).
         assert!((policy.log_sum_exp(&row(), 0) - 0.5 * ln(8.0)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_small_chance_is_worth_something() {
+        // 0.5 ln (1 + e^-80), though 1 + e^-80 is 1: 0.5 e^-80 to 35 digits.
+        let value = softmax(0.5).log_sum_exp(&[0.0, -40.0, f64::NEG_INFINITY], 0);
+        assert!((value / (0.5 * exp(-80.0)) - 1.0).abs() < 1e-15, "{value:e}");
     }
 
     #[test]
