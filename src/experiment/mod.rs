@@ -47,8 +47,8 @@ pub use predict::has_exact_values;
 pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
 pub use score::{Scored, score_variant};
 pub use store::{
-    Store, StoreError, StoredUnit, holds_weights, read_table, read_weights, write_atomically,
-    write_atomically_with,
+    Checkpoint, Model, Store, StoreError, StoredUnit, holds_model, holds_weights, read_model,
+    read_table, read_weights, write_atomically, write_atomically_with,
 };
 pub use train::{Limits, TrainError, World, train};
 pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};

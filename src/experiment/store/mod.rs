@@ -8,6 +8,8 @@
 
 mod atomic;
 mod format;
+mod model;
+mod tensors;
 mod weights;
 
 use std::fs::{self, File};
@@ -26,6 +28,7 @@ use crate::learn::QTable;
 use crate::script::Variant;
 
 pub use atomic::{write_atomically, write_atomically_with};
+pub use model::{Checkpoint, Model, holds_model, read_model};
 pub use weights::{holds_weights, read_weights};
 
 /// A file could not be written or read, or holds something else than it should.
