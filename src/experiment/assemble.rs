@@ -351,7 +351,7 @@ pub(super) fn network_agent<E: Env>(variant: &Variant, env: &E, seed: u64) -> Dq
         unreachable!("only asked of agents that learn networks")
     };
     let setup = NetworkSetup {
-        inputs: inputs(variant, env),
+        inputs: inputs(variant, env.n_states(), &env.schema()),
         n_actions: env.n_actions(),
         shielded: variant.allowed.is_some(),
         seed,
@@ -360,11 +360,12 @@ pub(super) fn network_agent<E: Env>(variant: &Variant, env: &E, seed: u64) -> Dq
     build(&variant.agent, setup)
 }
 
-/// What the variant's network sees of a state.
-pub(super) fn inputs<E: Env>(variant: &Variant, env: &E) -> Inputs {
-    match env.n_states() {
+/// What the variant's network sees of a state of an environment with so many of them, or infinitely
+/// many.
+pub(super) fn inputs(variant: &Variant, n_states: Option<usize>, schema: &Schema) -> Inputs {
+    match n_states {
         Some(n) => Inputs::OneHot(n),
-        None => Inputs::fields(env.schema().fields.len(), &variant.normalise),
+        None => Inputs::fields(schema.fields.len(), &variant.normalise),
     }
 }
 

@@ -262,6 +262,17 @@ impl<T: Real> Mlp<T> {
         if layers.len() < 2 {
             return Err("there is no hidden layer".into());
         }
+        // Before room is made for them: a file may be of any size.
+        for (i, pair) in layers.windows(2).enumerate() {
+            if pair[1].1 != pair[0].0 {
+                return Err(format!(
+                    "layer {} takes {} numbers, the layer before it gives {}",
+                    i + 1,
+                    pair[1].1,
+                    pair[0].0
+                ));
+            }
+        }
         let hidden = layers[..layers.len() - 1].iter().map(|layer| layer.0).collect();
         let shape = Shape { n_inputs: first.1, hidden, n_actions: last.0, dueling };
         let mut mlp = Self::zeros(shape);

@@ -12,7 +12,7 @@ pub(crate) fn build_of(spec: &AgentSpec) -> Option<BuildFn> {
         Build::Learner(build) | Build::OnPolicy { build, .. } | Build::OneStep { build, .. } => {
             Some(build)
         }
-        Build::Predictor(_) | Build::Planner(_) => None,
+        Build::Predictor(_) | Build::Network(_) | Build::Planner(_) => None,
     }
 }
 
