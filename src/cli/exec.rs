@@ -15,6 +15,7 @@ use crate::experiment::{Audit, ExecuteError, Execution, Progress, audit_variant,
 use crate::report::claims::{judge, rehearse};
 use crate::report::closing::closing_table;
 use crate::report::results::{Findings, FolderError, Results};
+use crate::report::tensorboard;
 use crate::script::{Host, Plan, SeedList, load};
 
 #[derive(Debug, ClapArgs)]
@@ -39,6 +40,9 @@ pub(super) struct Args {
     /// Run everything again, even what is already there
     #[arg(long)]
     fresh: bool,
+    /// Write the course of training for TensorBoard, into the folder `tensorboard` of the results
+    #[arg(long)]
+    tensorboard: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -67,12 +71,19 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let audits: Vec<Audit> =
         plan.variants.iter().map(|v| audit_variant(&host, v, None)).collect::<Result<_, _>>()?;
     let findings = results.derive(&plan, &execution, audits)?;
+    if args.tensorboard {
+        tensorboard::write(&results, &plan, &execution.units)?;
+    }
     if !args.quiet {
         out(&closing_table(&plan, &findings).render())?;
     }
     let held = expectations(&plan, &host, &findings, args.quiet)?;
     if !args.quiet {
         note(&format!("results in {}", folder.display()));
+        if args.tensorboard {
+            let events = folder.join(tensorboard::FOLDER);
+            note(&format!("to see them: tensorboard --logdir {}", events.display()));
+        }
     }
     Ok(if held { Outcome::Fine } else { Outcome::Failed })
 }
@@ -169,6 +180,9 @@ fn resume(args: &Args) -> String {
     add("--seeds", args.seeds.map(|n| n.to_string()));
     add("--episodes", args.episodes.map(|n| n.to_string()));
     add("--jobs", args.jobs.map(|n| n.to_string()));
+    if args.tensorboard {
+        command.push_str(" --tensorboard");
+    }
     command
 }
 

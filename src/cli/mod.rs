@@ -8,6 +8,7 @@ mod audit;
 mod check;
 mod completions;
 mod exec;
+mod export;
 mod golden;
 mod list;
 mod new;
@@ -53,6 +54,8 @@ enum Command {
     Show(show::Args),
     /// Play what a unit of a results folder has learned
     Play(play::Args),
+    /// Write a network that was learned as an ONNX model
+    Export(export::Args),
     /// Replay recorded Gymnasium trajectories and compare
     Parity(parity::Args),
     /// Compare what scripts learn with their golden files
@@ -159,6 +162,7 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
         Command::Rollout(args) => rollout::run(&args),
         Command::Show(args) => show::run(&args),
         Command::Play(args) => play::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Parity(args) => parity::run(&args),
         Command::Golden(args) => golden::run(&args),
         Command::New(args) => new::run(&args),

@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 
-use clap::Args as ClapArgs;
+use clap::{Args as ClapArgs, ValueEnum};
 
 use super::output::note;
 use super::view::{View, ViewArgs};
 use super::{Failure, Outcome};
 use crate::env::Session;
 use crate::env::rollout::{Event, Length};
-use crate::experiment::Values;
 use crate::experiment::play::{PlayedEpisode, Policy, play, session};
+use crate::experiment::{Checkpoint, Unit, Values};
 use crate::mdp::numpy::Seed;
 use crate::report::stored::Stored;
 use crate::script::Host;
@@ -38,8 +38,19 @@ pub(super) struct Args {
     /// Stop after so many steps in all [default: no limit but the variant's; 10000 without one]
     #[arg(long, value_name = "MAX", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
+    /// Which of its networks plays, of agents that learn such [default: last]
+    #[arg(long, value_enum)]
+    model: Option<Which>,
     #[command(flatten)]
     view: ViewArgs,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Which {
+    /// That of the end of training
+    Last,
+    /// That of the best returns
+    Best,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -49,23 +60,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let index = stored.variant(args.variant.as_deref())?;
     let variant = &stored.plan.variants[index];
     let unit = stored.unit(index, args.seed)?;
-    let Values::Q(q) = stored.learned(unit)?.values else {
-        return Err(Failure::Message(
-            format!(
-                "variant `{}` has no policy of its own: its agent `{}` learns the values of one that \
-                 is given",
-                variant.name, variant.agent.spec.name
-            ),
-            Some(format!("to see random play: runner rollout {} --policy random", variant.env.id)),
-        ));
-    };
+    let host = Host::open(&stored.plan)?;
+    let mut session = session(variant)?;
+    let mut policy = policy(args, &stored, unit, (&host, &session))?;
     if args.variant.is_none() && stored.plan.variants.len() > 1 {
         let names: Vec<&str> = stored.plan.variants.iter().map(|v| v.name.as_str()).collect();
         note(&format!("playing `{}`; --variant chooses among {}", variant.name, names.join(", ")));
     }
-    let host = Host::open(&stored.plan)?;
-    let mut session = session(variant)?;
-    let mut policy = Policy::new(&host, variant, &session, q);
     let endless = if variant.max_steps.is_some() { usize::MAX } else { ENDLESS };
     let length = Length {
         steps: args.steps.map_or(endless, |n| usize::try_from(n).unwrap_or(usize::MAX)),
@@ -85,6 +86,40 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         note(&format!("mean return of {} finished episodes: {mean}", finished.len()));
     }
     Ok(Outcome::Fine)
+}
+
+/// What the unit has learned, at play.
+fn policy(
+    args: &Args,
+    stored: &Stored,
+    unit: &Unit,
+    (host, session): (&Host, &Session),
+) -> Result<Policy, Failure> {
+    let variant = &stored.plan.variants[unit.variant];
+    let (name, agent) = (&variant.name, variant.agent.spec.name);
+    if variant.agent.is_network() {
+        let which = match args.model {
+            Some(Which::Best) => Checkpoint::Best,
+            Some(Which::Last) | None => Checkpoint::Last,
+        };
+        return Ok(Policy::of_network(host, variant, session, stored.model(unit, which)?));
+    }
+    if args.model.is_some() {
+        return Err(Failure::Message(
+            format!("--model: variant `{name}` has no networks: its agent `{agent}` learns none"),
+            Some("leave it out".into()),
+        ));
+    }
+    let Values::Q(q) = stored.learned(unit)?.values else {
+        return Err(Failure::Message(
+            format!(
+                "variant `{name}` has no policy of its own: its agent `{agent}` learns the values \
+                 of one that is given"
+            ),
+            Some(format!("to see random play: runner rollout {} --policy random", variant.env.id)),
+        ));
+    };
+    Ok(Policy::new(host, variant, session, q))
 }
 
 fn describe(number: usize, episode: &PlayedEpisode) -> String {

@@ -10,7 +10,7 @@ use super::{Failure, Outcome};
 use crate::env::rollout::{Event, Length, drive, parse_actions, random_policy};
 use crate::env::{PlayedAction, Session, find_with_note};
 use crate::experiment::play::{Policy, play};
-use crate::experiment::{holds_weights, read_table, read_weights};
+use crate::experiment::{holds_model, holds_weights, read_model, read_table, read_weights};
 use crate::mdp::numpy::Seed;
 use crate::mdp::streams::Stream;
 
@@ -28,7 +28,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "A,B,..", conflicts_with = "policy", allow_hyphen_values = true)]
     actions: Option<String>,
     /// Who plays if no actions are given: `random` for uniformly random actions from the seed, or
-    /// the policy.csv of a unit, if the environment is finite, or its weights.csv
+    /// the policy.csv of a unit, if the environment is finite, or its weights.csv, or the
+    /// model.safetensors or best.safetensors of a network
     #[arg(long, value_name = "random|FILE", default_value = "random")]
     policy: String,
     /// Number of steps that the policy plays
@@ -84,7 +85,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Fine)
 }
 
-/// The greedy policy of a `weights.csv`, or of a `policy.csv`. The rows of the latter are states only
+/// The greedy policy of a model, of a `weights.csv`, or of a `policy.csv`. The rows of the latter are states only
 /// where the environment is finite: elsewhere they are cells of a discretiser, which the file does
 /// not tell.
 fn stored_policy(session: &Session, path: &Path) -> Result<Policy, Failure> {
@@ -93,10 +94,14 @@ fn stored_policy(session: &Session, path: &Path) -> Result<Policy, Failure> {
         return Err(Failure::Message(
             format!("--policy: there is no file `{}`", path.display()),
             Some(
-                "give `random`, or the policy.csv or weights.csv of a unit of a results folder"
+                "give `random`, or the policy.csv, weights.csv or model.safetensors of a unit of a \
+                 results folder"
                     .into(),
             ),
         ));
+    }
+    if holds_model(path) {
+        return Ok(Policy::of_model(read_model(path, session)?));
     }
     if holds_weights(path) {
         let (q, frame_skip) = read_weights(path, session.schema())?;

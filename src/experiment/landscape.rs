@@ -6,8 +6,11 @@ use super::shaped;
 use crate::env::{EnvVisitor, Session};
 use crate::learn::{LinearQ, QTable};
 use crate::mdp::{Env, MAX_FIELDS, Schema};
+use crate::nn::{Activations, Kernels, Mlp};
 use crate::script::{Diagnostic, DiscretiserSpec, Host, PhiOn, Variant};
-use crate::shaping::{ActionSet, Active, Bins, CellFn, Fault, Features, PhiFn, ShieldFn};
+use crate::shaping::{
+    ActionSet, Active, Bins, CellFn, Fault, Features, Fields, Inputs, PhiFn, ShieldFn,
+};
 
 /// From a state to the row of the table that stands for it.
 pub(super) enum Locate {
@@ -57,6 +60,39 @@ pub(super) enum Lookup {
         /// Its values.
         row: Vec<f64>,
     },
+    /// A network.
+    Network(Box<Network>),
+}
+
+/// A network, with room for one state.
+pub(super) struct Network {
+    net: Mlp<f32>,
+    inputs: Inputs,
+    kernels: Kernels,
+    /// What is kept of the state, and the inputs that are made of it.
+    kept: Vec<f32>,
+    x: Vec<f32>,
+    activations: Activations<f32>,
+    /// Its values.
+    row: Vec<f64>,
+}
+
+impl Network {
+    fn present(&mut self, session: &Session) -> &[f64] {
+        let mut state = Fields {
+            values: [0.0; MAX_FIELDS],
+            index: session.state_index().unwrap_or(0),
+            allowed: ActionSet::ALL,
+        };
+        state.values[..session.fields().len()].copy_from_slice(session.fields());
+        self.inputs.keep(&state, &mut self.kept);
+        self.inputs.expand(&self.kept, &mut self.x);
+        self.net.forward(self.kernels, &self.x, self.x.len(), &mut self.activations);
+        for (value, q) in self.row.iter_mut().zip(self.activations.q(0)) {
+            *value = f64::from(*q);
+        }
+        &self.row
+    }
 }
 
 impl Lookup {
@@ -77,6 +113,19 @@ impl Lookup {
         Self::Linear { q, active, row }
     }
 
+    /// Those of a network that sees `inputs`.
+    pub(super) fn network(net: Mlp<f32>, inputs: Inputs) -> Self {
+        Self::Network(Box::new(Network {
+            kernels: Kernels::detect(),
+            kept: vec![0.0; inputs.n_kept()],
+            x: vec![0.0; inputs.n_inputs()],
+            activations: Activations::new(&net, 1),
+            row: vec![0.0; net.shape().n_actions],
+            net,
+            inputs,
+        }))
+    }
+
     /// One value per action.
     pub(super) fn present(&mut self, session: &Session) -> Result<&[f64], Fault> {
         match self {
@@ -86,6 +135,7 @@ impl Lookup {
                 q.values(active, row);
                 Ok(row)
             }
+            Self::Network(network) => Ok(network.present(session)),
         }
     }
 }

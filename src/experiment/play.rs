@@ -7,6 +7,7 @@
 //! many steps as the variant's `frame_skip` says.
 
 use super::landscape::{Locate, Lookup};
+use super::store::Model;
 use crate::env::rollout::{Event, Length, RolloutError, drive};
 use crate::env::{EnvError, PlayedAction, Session};
 use crate::learn::{LinearQ, QTable, argmax_allowed};
@@ -29,12 +30,20 @@ impl Policy {
     /// The policy of `variant` that is greedy with respect to `q`, the table (or the weights) of
     /// one of its units.
     pub fn new(host: &Host, variant: &Variant, session: &Session, q: QTable) -> Self {
-        let shield = variant
-            .allowed
-            .as_ref()
-            .map(|allowed| host.callbacks().shield(allowed, q.n_actions(), session.schema()));
         let values = Lookup::new(host, variant, session.schema(), q);
-        Self { values, shield, frame_skip: variant.frame_skip, held: 0 }
+        Self::shielded(host, variant, session, values)
+    }
+
+    /// The policy of `variant` that is greedy with respect to a network of one of its units.
+    pub fn of_network(host: &Host, variant: &Variant, session: &Session, model: Model) -> Self {
+        let values = Lookup::network(model.net, model.inputs);
+        Self::shielded(host, variant, session, values)
+    }
+
+    fn shielded(host: &Host, variant: &Variant, session: &Session, values: Lookup) -> Self {
+        let (schema, frame_skip) = (session.schema(), variant.frame_skip);
+        let shield = |allowed| host.callbacks().shield(allowed, schema.actions.len(), schema);
+        Self { values, shield: variant.allowed.as_ref().map(shield), frame_skip, held: 0 }
     }
 
     /// The policy of a table that has one row per state of a finite environment.
@@ -46,6 +55,12 @@ impl Policy {
     /// The policy of values that are linear in features; an action is played for `frame_skip` steps.
     pub fn of_weights(q: LinearQ, frame_skip: u32) -> Self {
         Self { values: Lookup::linear(q), shield: None, frame_skip, held: 0 }
+    }
+
+    /// The policy of a network that fits the session.
+    pub fn of_model(model: Model) -> Self {
+        let Model { net, inputs, frame_skip, .. } = model;
+        Self { values: Lookup::network(net, inputs), shield: None, frame_skip, held: 0 }
     }
 
     /// The action for the session's present state.

@@ -10,6 +10,7 @@
 //! - [`table`]: tables in the terminal; [`closing`]: the one that closes a study
 //! - [`picture`]: a table of action values over two of the state's fields; [`frame`]: which ones
 //! - [`heat_map`], [`value_map`]: pictures in the terminal; [`picture_svg`]: as SVG
+//! - [`onnx`]: a network as an ONNX model; [`tensorboard`]: training for TensorBoard
 //! - `colours`: a perceptually uniform scale, and colours for actions
 //! - `legend`: the legend of the curves
 //! - `runs`: a variant's units, gathered for tables and plots
@@ -25,6 +26,7 @@ pub mod frame;
 pub mod heat_map;
 mod legend;
 pub mod manifest;
+pub mod onnx;
 pub mod picture;
 pub mod picture_svg;
 pub mod results;
@@ -34,4 +36,5 @@ pub mod stored;
 pub mod summary;
 mod svg;
 pub mod table;
+pub mod tensorboard;
 pub mod value_map;

@@ -9,6 +9,7 @@ use super::curves::{CurvesPlot, NATIVE_RETURN, VALUE_ERROR, curves_svg};
 use super::manifest::{file_name, manifest};
 use super::runs::Runs;
 use super::summary::VariantSummary;
+use super::tensorboard;
 use crate::experiment::{
     Audit, Execution, Store, StoreError, Unit, units, write_atomically, write_atomically_with,
 };
@@ -295,7 +296,8 @@ fn is_ours(path: &str) -> bool {
         "curves.svg",
         "timing.json",
     ];
-    FILES.contains(&path) || path.starts_with("units/")
+    let folder = path.split('/').next().unwrap_or(path);
+    FILES.contains(&path) || ["units", tensorboard::FOLDER].contains(&folder)
 }
 
 fn term_names(plan: &Plan) -> Vec<&str> {

@@ -7,8 +7,10 @@ use serde_json::Value;
 
 use super::results::{Findings, rate, read_times};
 use super::runs::Runs;
+use crate::experiment::play::session;
 use crate::experiment::{
-    Learned, SEMANTICS, Store, StoreError, StoredUnit, Unit, audit_variant, units,
+    Checkpoint, Learned, Model, SEMANTICS, Store, StoreError, StoredUnit, Unit, audit_variant,
+    units,
 };
 use crate::script::{Diagnostic, Host, Plan, SeedList, Source, Variant, load, suggest};
 
@@ -168,6 +170,21 @@ impl Stored {
                 format!("to see random play: runner rollout {} --policy random", variant.env.id),
             )
         })
+    }
+
+    /// A network of a unit whose agent learns such.
+    ///
+    /// # Errors
+    /// As [`Self::load`], and if there is no such network.
+    pub fn model(&self, unit: &Unit, which: Checkpoint) -> Result<Model, StoredError> {
+        let variant = &self.plan.variants[unit.variant];
+        self.load(unit)?;
+        let path = self.store.path(unit).join(which.file_name());
+        let bad = |what: &str| StoredError::Message(format!("{}: {what}", path.display()), None);
+        let model = self.store.model(unit, which)?.ok_or_else(|| bad("is not there"))?;
+        let session = session(variant).map_err(|e| StoredError::Message(e.message, e.hint))?;
+        model.fits(&session).map_err(|what| bad(&what))?;
+        Ok(model)
     }
 
     /// The units that are there, and if some are not, what is missing and how to go on.

@@ -8,6 +8,7 @@
 
 mod atomic;
 mod format;
+mod learning;
 mod model;
 mod tensors;
 mod weights;
@@ -21,10 +22,12 @@ use self::format::{
     ResultFile, SCHEMA, StoredValue, initial_value, is_initial, mark, monitor, policy,
     read_monitor, read_policy, read_values, sweeps, values,
 };
+use self::learning::read_learning;
 use self::weights::{Initial, weights};
 use super::record::{EpisodeRow, Learned, UnitRecord, Values};
 use super::unit::Unit;
 use crate::learn::QTable;
+use crate::learn::dqn::LogRow;
 use crate::script::Variant;
 
 pub use atomic::{write_atomically, write_atomically_with};
@@ -325,6 +328,34 @@ impl Store {
             }
         }
         Ok(stored)
+    }
+
+    /// A unit's network; `None` if it has no such.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn model(&self, unit: &Unit, which: Checkpoint) -> Result<Option<Model>, StoreError> {
+        self.file(unit, which.file_name(), Model::decode)
+    }
+
+    /// What was written down of a network's learning; nothing if the unit has learned none.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn learning(&self, unit: &Unit) -> Result<Vec<LogRow>, StoreError> {
+        Ok(self.file(unit, "learning.csv", read_learning)?.unwrap_or_default())
+    }
+
+    /// What a file of a unit holds, if there is one of this name.
+    fn file<T>(
+        &self,
+        unit: &Unit,
+        name: &str,
+        read: impl FnOnce(&[u8]) -> Result<T, String>,
+    ) -> Result<Option<T>, StoreError> {
+        let (_, files) = self.verified(unit)?;
+        let Some((_, bytes)) = files.iter().find(|file| file.0 == name) else { return Ok(None) };
+        read(bytes).map(Some).map_err(|what| StoreError::new(&self.path(unit).join(name), what))
     }
 }
 

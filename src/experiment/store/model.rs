@@ -197,8 +197,11 @@ impl Model {
         Ok(Self { net, inputs, fields, actions, frame_skip, manifest })
     }
 
-    /// Whether it can play in `session`; if not, how its environment differs.
-    fn fits(&self, session: &Session) -> Result<(), String> {
+    /// Whether it can play in `session`.
+    ///
+    /// # Errors
+    /// If not: how its environment differs.
+    pub fn fits(&self, session: &Session) -> Result<(), String> {
         let schema = session.schema();
         let env = self.manifest.get("env").map_or("another environment", String::as_str);
         if self.actions != schema.actions {

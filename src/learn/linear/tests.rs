@@ -105,7 +105,9 @@ fn one_tiling_is_a_table() {
                 Build::Learner(build)
                 | Build::OnPolicy { build, .. }
                 | Build::OneStep { build, .. } => build,
-                Build::Predictor(_) | Build::Network(_) | Build::Planner(_) => panic!("{}", spec.name),
+                Build::Predictor(_) | Build::Network(_) | Build::Planner(_) => {
+                    panic!("{}", spec.name)
+                }
             };
             let setup = Setup {
                 n_states: ROWS,
