@@ -1,8 +1,11 @@
 //! What a unit leaves behind.
 
+use super::store::Checkpoint;
+use crate::learn::dqn::LogRow;
 use crate::learn::planning::Sweep;
 use crate::learn::{LinearQ, QTable};
 use crate::mdp::Ending;
+use crate::nn::Mlp;
 use crate::shaping::{ActionSet, Features};
 
 /// One episode.
@@ -29,7 +32,7 @@ pub struct EpisodeRow {
 }
 
 /// Everything one unit produced.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct UnitRecord {
     /// Its episodes, in order.
     pub rows: Vec<EpisodeRow>,
@@ -42,6 +45,21 @@ pub struct UnitRecord {
     pub values: Option<StateValues>,
     /// How a planner came to its solution; empty for learners.
     pub sweeps: Vec<Sweep>,
+    /// The networks learned, if that is what the agent learns.
+    pub networks: Vec<TrainedNetwork>,
+    /// What was written down of their learning.
+    pub log: Vec<LogRow>,
+}
+
+/// A network that is kept.
+#[derive(Debug, Clone)]
+pub struct TrainedNetwork {
+    /// As what.
+    pub which: Checkpoint,
+    /// After how many episodes.
+    pub episode: u32,
+    /// The network.
+    pub net: Mlp<f32>,
 }
 
 /// State values with what they should be.

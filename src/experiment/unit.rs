@@ -6,7 +6,8 @@ use sha2::{Digest, Sha256};
 
 use super::assemble::Assembled;
 use super::predict::Exact;
-use super::record::{EpisodeRow, StateValues, UnitRecord};
+use super::record::{EpisodeRow, StateValues, TrainedNetwork, UnitRecord};
+use super::store::Checkpoint;
 use super::train::{Limits, TrainError, World, train};
 use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
@@ -322,7 +323,13 @@ impl RunUnit<'_> {
             v: v.to_vec(),
             exact: exact.map_or_else(Vec::new, |exact| exact.v),
         });
-        Ok(UnitRecord { rows, q, weights, values, sweeps })
+        let (mut networks, mut log) = (Vec::new(), Vec::new());
+        if let Some(dqn) = agent.dqn() {
+            let (which, episode) = (Checkpoint::Last, rows.len() as u32);
+            networks.push(TrainedNetwork { which, episode, net: dqn.network().clone() });
+            log.extend(dqn.log());
+        }
+        Ok(UnitRecord { rows, q, weights, values, sweeps, networks, log })
     }
 }
 

@@ -12,6 +12,7 @@ mod frozen_lake;
 mod golden;
 mod language;
 mod linear;
+mod models;
 mod mountain_car_tiles;
 mod numbers;
 mod parity;

@@ -22,7 +22,8 @@ use self::format::{
     ResultFile, SCHEMA, StoredValue, initial_value, is_initial, mark, monitor, policy,
     read_monitor, read_policy, read_values, sweeps, values,
 };
-use self::learning::read_learning;
+use self::learning::{learning, read_learning};
+use self::model::model;
 use self::weights::{Initial, weights};
 use super::record::{EpisodeRow, Learned, UnitRecord, Values};
 use super::unit::Unit;
@@ -234,6 +235,13 @@ impl Store {
         }
         if !record.sweeps.is_empty() {
             files.push(("sweeps.csv", sweeps(&record.sweeps)));
+        }
+        for network in &record.networks {
+            let bytes = model((unit, variant), network);
+            files.push((network.which.file_name(), bytes));
+        }
+        if !record.networks.is_empty() {
+            files.push(("learning.csv", learning(&record.log)));
         }
         let result = ResultFile {
             schema: SCHEMA,

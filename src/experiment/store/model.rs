@@ -26,6 +26,7 @@ use super::tensors::{Texts, decode, encode};
 use crate::env::Session;
 use crate::experiment::Unit;
 use crate::experiment::assemble::inputs;
+use crate::experiment::record::TrainedNetwork;
 use crate::mdp::{Field, Schema};
 use crate::nn::Mlp;
 use crate::script::Variant;
@@ -125,12 +126,8 @@ pub struct Model {
     pub manifest: Texts,
 }
 
-/// The file of the network that `unit` of `variant` had after `episode` episodes.
-pub(super) fn model(
-    (unit, variant): (&Unit, &Variant),
-    (which, episode): (Checkpoint, u32),
-    net: &Mlp<f32>,
-) -> Vec<u8> {
+/// The file of a network that `unit` of `variant` has learned.
+pub(super) fn model((unit, variant): (&Unit, &Variant), network: &TrainedNetwork) -> Vec<u8> {
     let env = variant.environment().expect("it has been made before");
     let schema = env.schema();
     let inputs = inputs(variant, env.n_states(), &schema);
@@ -143,14 +140,14 @@ pub(super) fn model(
         ("config", config.to_string()),
         ("unit", unit.hash.clone()),
         ("seed", unit.seed.to_string()),
-        ("checkpoint", which.as_str().to_string()),
-        ("episode", episode.to_string()),
+        ("checkpoint", network.which.as_str().to_string()),
+        ("episode", network.episode.to_string()),
         ("inputs", json!(Seen::new(&inputs, &schema)).to_string()),
         ("actions", json!(schema.actions).to_string()),
         ("frame_skip", variant.frame_skip.to_string()),
     ];
     let manifest = entries.map(|(name, text)| (name.to_string(), text)).into();
-    encode(&net.tensors(), &manifest)
+    encode(&network.net.tensors(), &manifest)
 }
 
 impl Model {
@@ -283,7 +280,8 @@ mod tests {
 
     fn file(script: &str, net: &Mlp<f32>) -> Vec<u8> {
         let plan = plan(script);
-        model((&units(&plan)[0], &plan.variants[0]), (Checkpoint::Best, 2), net)
+        let network = TrainedNetwork { which: Checkpoint::Best, episode: 2, net: net.clone() };
+        model((&units(&plan)[0], &plan.variants[0]), &network)
     }
 
     fn session(id: &str) -> Session {
