@@ -162,6 +162,13 @@ impl Stored {
         let variant = &self.plan.variants[unit.variant];
         self.load(unit)?.learned(variant).ok_or_else(|| {
             let agent = variant.agent.spec.name;
+            if variant.agent.is_network() {
+                let (name, shown) = (&variant.name, self.folder.display());
+                return StoredError::new(
+                    format!("variant `{name}` has no table: its agent `{agent}` learns a network"),
+                    format!("to see it play: runner play {shown} --variant {name}"),
+                );
+            }
             StoredError::new(
                 format!(
                     "variant `{}` has no policy: its agent `{agent}` learns none",
