@@ -31,6 +31,8 @@ from stable_baselines3 import DQN
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.monitor import Monitor
 
+from torch_dqn import timed
+
 WARM_UP = 500
 
 
@@ -59,25 +61,24 @@ def speed(args):
     )
     model.set_logger(Logger(folder=None, output_formats=[]))
     model.learn(args.buffer + WARM_UP)
-    start, cpu = time.perf_counter(), time.process_time()
-    model.learn(args.steps, reset_num_timesteps=False)
-    seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
-    start = time.perf_counter()
-    for _ in range(args.steps):
-        model.train(gradient_steps=1, batch_size=args.batch)
-    gradient = time.perf_counter() - start
-    print(
-        json.dumps(
-            {
-                "steps": args.steps,
-                "seconds": seconds,
-                "cpu_seconds": cpu,
-                "steps_per_second": args.steps / seconds,
-                "microseconds_per_step": seconds / args.steps * 1e6,
-                "microseconds_per_gradient_step": gradient / args.steps * 1e6,
-            }
-        )
+    steps = args.steps
+    seconds, cpu = timed(lambda: model.learn(steps, reset_num_timesteps=False))
+    gradient, gradient_cpu = timed(
+        lambda: [model.train(gradient_steps=1, batch_size=args.batch) for _ in range(steps)]
     )
+    result = {
+        "net": args.net,
+        "batch": args.batch,
+        "steps": steps,
+        "seconds": seconds,
+        "cpu_seconds": cpu,
+        "steps_per_second": steps / seconds,
+        "microseconds_per_step": seconds / steps * 1e6,
+        "cpu_microseconds_per_step": cpu / steps * 1e6,
+        "microseconds_per_gradient_step": gradient / steps * 1e6,
+        "cpu_microseconds_per_gradient_step": gradient_cpu / steps * 1e6,
+    }
+    print(json.dumps(result))
 
 
 def curves(args):
@@ -134,10 +135,10 @@ def main():
     many.add_argument("--steps", type=int, default=50_000)
     many.add_argument("--net", default="64,64")
     many.add_argument("--buffer", type=int, default=50_000)
-    many.add_argument("--learning-rate", type=float, default=1e-3)
+    many.add_argument("--learning-rate", type=float, default=2.5e-4)
     many.add_argument("--learning-starts", type=int, default=1000)
     many.add_argument("--gamma", type=float, default=0.99)
-    many.add_argument("--target-update-interval", type=int, default=500)
+    many.add_argument("--target-update-interval", type=int, default=250)
     many.add_argument("--epsilon", type=float, nargs=2, default=[1.0, 0.04])
     many.add_argument("--epsilon-steps", type=int, default=8000)
     many.add_argument("--max-grad-norm", type=float, default=10.0)
