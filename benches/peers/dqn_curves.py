@@ -12,11 +12,12 @@ there, exploration included. Per point the table has the mean over seeds of eith
 grid, one number a seed, is compared by Welch's interval of the difference. The curves agree if the
 intervals overlap at every point and Welch's holds 0; otherwise the exit code is 1.
 
---theirs takes a file that `sb3_dqn.py curves` wrote before, which saves their hour of training, and
+--theirs takes a file that `sb3_dqn.py curves` wrote before, which saves a minute or two per seed, and
 --ours a folder of results of the script that `--print-script` shows.
 
-What differs by design: Stable-Baselines3 plays at random until `learning_starts`, where epsilon has
-come down from 1 to 0.88; its random streams are its own.
+Both play at random until `learning_starts`, update the target before the gradient step of the same
+step, draw minibatches with replacement and start from PyTorch's weights; random streams differ, and
+with them the first states of the episodes.
 """
 
 import argparse
