@@ -28,6 +28,7 @@ mod shaping_figures;
 mod shield;
 mod show;
 mod solved;
+mod stopping;
 mod support;
 mod theory;
 mod toy_text;
