@@ -30,6 +30,7 @@ mod show;
 mod solved;
 mod stopping;
 mod support;
+mod task;
 mod theory;
 mod toy_text;
 mod unreadable;
