@@ -24,6 +24,7 @@ pub mod env;
 pub mod experiment;
 pub mod learn;
 pub mod mdp;
+pub mod nn;
 pub mod render;
 pub mod report;
 pub mod script;

@@ -101,7 +101,7 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
         rows.push(("setting", line));
     }
     match &v.discretiser {
-        DiscretiserSpec::StateIndex => {}
+        DiscretiserSpec::StateIndex | DiscretiserSpec::Raw => {}
         DiscretiserSpec::Bins(dims) => {
             let sizes: Vec<String> = dims.iter().map(|d| d.n.to_string()).collect();
             let cells: usize = dims.iter().map(|d| d.n).product();
@@ -135,7 +135,7 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     if let Some(potential) = &v.potential {
         let on = match (&v.discretiser, v.potential_on) {
             (DiscretiserSpec::StateIndex, _) => "tabulated over the states",
-            (DiscretiserSpec::Features(_), _) => {
+            (DiscretiserSpec::Features(_) | DiscretiserSpec::Raw, _) => {
                 "on the state itself, interpreted at every step: keeps the optimal policy, \
                  equals no initial values"
             }

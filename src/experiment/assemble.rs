@@ -4,6 +4,7 @@ use super::endless::refuse_endless;
 use super::predict::{Exact, given_policy};
 use super::shaped::{learner, potential};
 use super::shielded::playable;
+use crate::learn::dqn::{Dqn, NetworkSetup};
 use crate::learn::planning::{PlannedAgent, Sweep};
 use crate::learn::registry::{Build, Setup};
 use crate::learn::{AnyAgent, Learn, LinearSetup};
@@ -11,8 +12,8 @@ use crate::mdp::streams::Stream;
 use crate::mdp::{Env, FiniteMdp, Schema};
 use crate::script::{Callback, Diagnostic, DiscretiserSpec, Host, Variant};
 use crate::shaping::{
-    AnyReward, Bins, Fault, FeatureSpec, Features, Fields, MAX_FIELDS, NativeReward, Potential,
-    RewardModel, ScriptedReward, Shield, TabulatedReward, Transition, shaped_model,
+    AnyReward, Bins, Fault, FeatureSpec, Features, Fields, Inputs, MAX_FIELDS, NativeReward,
+    Potential, RewardModel, ScriptedReward, Shield, TabulatedReward, Transition, shaped_model,
 };
 
 /// A state with every field in the middle of its range (0 where that is unbounded): the values of
@@ -54,7 +55,7 @@ pub(super) fn representative<E: Env + Clone + 'static>(
                 fields
             }))
         }
-        DiscretiserSpec::Cells { .. } | DiscretiserSpec::Features(_) => None,
+        DiscretiserSpec::Cells { .. } | DiscretiserSpec::Features(_) | DiscretiserSpec::Raw => None,
     }
 }
 
@@ -330,6 +331,7 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let agent = learner(host, variant, env, build, setup)?;
             Ok(Assembled { agent, sweeps: Vec::new(), exact })
         }
+        Build::Network(_) => unreachable!("networks have a loop of their own"),
         Build::Planner(build) => {
             let planner = build(&variant.agent);
             let model = learned_model(host, variant, env)?;
@@ -340,6 +342,29 @@ pub(super) fn agent<E: Env + Clone + 'static>(
             let agent = AnyAgent::tabular(PlannedAgent::new(solution, planner.gamma()));
             Ok(Assembled { agent, sweeps, exact: None })
         }
+    }
+}
+
+/// The variant's agent for one seed, where it learns a network.
+pub(super) fn network_agent<E: Env>(variant: &Variant, env: &E, seed: u64) -> Dqn {
+    let Build::Network(build) = variant.agent.spec.build else {
+        unreachable!("only asked of agents that learn networks")
+    };
+    let setup = NetworkSetup {
+        inputs: inputs(variant, env),
+        n_actions: env.n_actions(),
+        shielded: variant.allowed.is_some(),
+        seed,
+        model: None,
+    };
+    build(&variant.agent, setup)
+}
+
+/// What the variant's network sees of a state.
+pub(super) fn inputs<E: Env>(variant: &Variant, env: &E) -> Inputs {
+    match env.n_states() {
+        Some(n) => Inputs::OneHot(n),
+        None => Inputs::fields(env.schema().fields.len(), &variant.normalise),
     }
 }
 

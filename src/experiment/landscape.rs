@@ -27,7 +27,7 @@ impl Locate {
             DiscretiserSpec::Bins(dims) => {
                 Self::Bins(Bins::new(dims).expect("checked when the plan was resolved"))
             }
-            DiscretiserSpec::Features(_) => return None,
+            DiscretiserSpec::Features(_) | DiscretiserSpec::Raw => return None,
             DiscretiserSpec::Cells { shape, cell } => {
                 Self::Cells(host.callbacks().cells(cell, shape, &variant.normalise, schema))
             }

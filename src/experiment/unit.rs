@@ -17,7 +17,7 @@ use crate::mdp::Env;
 use crate::mdp::numpy::NumpyRng;
 use crate::script::{Diagnostic, DiscretiserSpec, Host, Plan, Variant};
 use crate::shaping::{
-    AnyCells, AnyPotential, AnyReward, Bins, Discretiser, Fault, FeatureSpec, NativeReward,
+    AnyCells, AnyPotential, AnyReward, Bins, Discretiser, Fault, FeatureSpec, Fields, NativeReward,
     NoPotential, Potential, RawFields, RewardModel, ScriptedCells, Shield, ShieldedCells,
     StateIndex,
 };
@@ -140,6 +140,9 @@ impl EnvVisitor for RunUnit<'_> {
     fn visit<E: Env + Clone + 'static>(self, env: E) -> Self::Out {
         let (host, variant) = (self.host, self.variant);
         let shield = assemble::shield(host, variant, &env);
+        if variant.agent.is_network() {
+            return self.network(env, shield);
+        }
         let cells = match &variant.discretiser {
             DiscretiserSpec::StateIndex => {
                 let index = StateIndex { n_states: env.n_states().unwrap_or(0) };
@@ -156,6 +159,7 @@ impl EnvVisitor for RunUnit<'_> {
                 AnyCells::Bins(bins)
             }
             DiscretiserSpec::Features(features) => return self.linear(env, features, shield),
+            DiscretiserSpec::Raw => unreachable!("for networks only"),
             DiscretiserSpec::Cells { shape, cell } => {
                 let schema = env.schema();
                 let cell = host.callbacks().cells(cell, shape, &variant.normalise, &schema);
@@ -250,7 +254,24 @@ impl RunUnit<'_> {
         let potential = shaped::potential(host, variant, &env, 1).map_err(fault)?;
         let reward = assemble::reward(host, variant, &env).map_err(fault)?;
         let agent = assemble::linear_agent(variant, features, &env, seed);
-        let discretiser = RawFields { shield };
+        let discretiser = RawFields { n_states: 0, shield };
+        let extra = Extra { sweeps: Vec::new(), exact: None };
+        self.train(World { env, discretiser, potential, reward }, agent, extra)
+    }
+
+    /// One loop for every network, potential and reward.
+    fn network<E: Env + Clone + 'static>(
+        self,
+        env: E,
+        shield: Option<Shield>,
+    ) -> Result<UnitRecord, UnitError> {
+        let (host, variant, seed) = (self.host, self.variant, self.seed);
+        let fault = |f| UnitError::fault(variant, seed, f);
+        let n_states = env.n_states().unwrap_or(0);
+        let potential = shaped::potential(host, variant, &env, n_states.max(1)).map_err(fault)?;
+        let reward = assemble::reward(host, variant, &env).map_err(fault)?;
+        let agent: Box<dyn Learn<Fields>> = Box::new(assemble::network_agent(variant, &env, seed));
+        let discretiser = RawFields { n_states, shield };
         let extra = Extra { sweeps: Vec::new(), exact: None };
         self.train(World { env, discretiser, potential, reward }, agent, extra)
     }

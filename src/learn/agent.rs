@@ -1,6 +1,7 @@
 //! What an agent is.
 
 use super::QTable;
+use super::dqn::Dqn;
 use crate::mdp::Action;
 pub use crate::shaping::Seen;
 
@@ -36,6 +37,11 @@ pub trait Agent {
 
     /// The state values learned so far, one per state, if that is what the agent learns.
     fn v(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// The agent, if it learns a network.
+    fn dqn(&self) -> Option<&Dqn> {
         None
     }
 
@@ -89,6 +95,10 @@ impl<T: Agent + ?Sized> Agent for Box<T> {
 
     fn v(&self) -> Option<&[f64]> {
         (**self).v()
+    }
+
+    fn dqn(&self) -> Option<&Dqn> {
+        (**self).dqn()
     }
 
     fn shaping(&self) -> f64 {

@@ -83,6 +83,17 @@ impl EpsilonGreedy {
     pub fn new(schedule: Schedule, stream: Stream) -> Self {
         Self { epsilon: ScheduleState::new(schedule), stream }
     }
+
+    /// How far it has come: what [`Self::restore`] needs.
+    pub fn state(&self) -> (Stream, (u64, f64)) {
+        (self.stream.clone(), self.epsilon.state())
+    }
+
+    /// As far as it was at [`Self::state`].
+    pub fn restore(&mut self, (stream, epsilon): (Stream, (u64, f64))) {
+        self.stream = stream;
+        self.epsilon.restore(epsilon);
+    }
 }
 
 impl Explore for EpsilonGreedy {

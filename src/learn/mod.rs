@@ -2,7 +2,7 @@
 //!
 //! - [`Agent`], [`Learn`]: chooses actions and learns from rewards
 //! - [`control`]: agents that learn a table of action values step by step; [`RandomAgent`]
-//! - [`linear`]: agents whose action values are linear in features
+//! - [`linear`]: agents whose action values are linear in features; [`dqn`]: networks
 //! - [`MonteCarlo`], [`OffPolicyMonteCarlo`]: from the returns of whole episodes
 //! - [`prediction`]: the state values of a policy that is given
 //! - [`planning`]: value iteration, policy iteration, exact policy evaluation on a [`FiniteMdp`]
@@ -20,6 +20,7 @@ mod agent;
 mod behaviour;
 mod bootstrapped;
 pub mod control;
+pub mod dqn;
 mod episode;
 mod greedy;
 pub mod linear;
@@ -49,7 +50,7 @@ pub use linear::{LinearLearner, LinearQ, LinearSetup};
 pub use look_back::LookBack;
 pub use monte_carlo::MonteCarlo;
 pub use off_policy_monte_carlo::OffPolicyMonteCarlo;
-pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature};
+pub use params::{AgentConfig, ParamKind, ParamSpec, ParamValue, Signature, Widths};
 pub use q_table::QTable;
 pub use random_agent::RandomAgent;
 pub use registry::{AgentSpec, AnyAgent};

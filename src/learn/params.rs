@@ -28,6 +28,8 @@ pub enum ParamValue {
     Exploration(Exploration),
     /// One of several words.
     Word(&'static str),
+    /// Widths of layers.
+    Widths(Widths),
     /// A script's function, which the script host keeps.
     Function,
 }
@@ -39,6 +41,7 @@ impl std::fmt::Display for ParamValue {
             Self::Float(x) => write!(f, "{x:?}"),
             Self::Bool(yes) => write!(f, "{yes}"),
             Self::Word(word) => write!(f, "{word:?}"),
+            Self::Widths(widths) => write!(f, "{:?}", widths.as_slice()),
             Self::Function => write!(f, "a function"),
             Self::VisitCount { omega: 1.0 } => write!(f, "visit_count()"),
             Self::VisitCount { omega } => write!(f, "visit_count({omega:?})"),
@@ -59,6 +62,49 @@ fn steps(unit: Unit) -> &'static str {
     match unit {
         Unit::Episode => "",
         Unit::Step => ", #{ steps: true }",
+    }
+}
+
+/// The widths of a network's hidden layers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Widths {
+    n: usize,
+    values: [u32; Self::MAX_LAYERS],
+}
+
+impl Widths {
+    /// The largest number of hidden layers.
+    pub const MAX_LAYERS: usize = 6;
+
+    /// The largest number of units in a layer.
+    pub const MAX_UNITS: u64 = 4096;
+
+    /// These; `None` if there are none or too many of them, or one is 0 or too wide.
+    pub const fn new(widths: &[u64]) -> Option<Self> {
+        if widths.is_empty() || widths.len() > Self::MAX_LAYERS {
+            return None;
+        }
+        let mut values = [0; Self::MAX_LAYERS];
+        let mut i = 0;
+        while i < widths.len() {
+            if widths[i] == 0 || widths[i] > Self::MAX_UNITS {
+                return None;
+            }
+            values[i] = widths[i] as u32;
+            i += 1;
+        }
+        Some(Self { n: widths.len(), values })
+    }
+
+    /// One for each layer.
+    pub fn as_slice(&self) -> &[u32] {
+        &self.values[..self.n]
+    }
+}
+
+impl Serialize for Widths {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.as_slice().serialize(serializer)
     }
 }
 
@@ -92,9 +138,19 @@ pub enum ParamKind {
     Exploration,
     /// One of these words.
     Word(&'static [&'static str]),
+    /// A finite number above 0 and up to `max`, or [`Self::NONE`].
+    Maybe {
+        /// Upper limit.
+        max: f64,
+    },
+    /// The widths of hidden layers.
+    Widths,
 }
 
 impl ParamKind {
+    /// What a parameter is that may be left out and was.
+    pub const NONE: &'static str = "none";
+
     /// What is allowed, in words.
     pub fn allowed(&self) -> String {
         match *self {
@@ -110,6 +166,15 @@ impl ParamKind {
                 (true, false) => format!("a number of at least {min}"),
                 _ => "a finite number".into(),
             },
+            Self::Maybe { max } if max.is_finite() => {
+                format!("a number above 0 and at most {max}, or {:?}", Self::NONE)
+            }
+            Self::Maybe { .. } => format!("a number above 0, or {:?}", Self::NONE),
+            Self::Widths => format!(
+                "a list of 1 to {} whole numbers from 1 to {}",
+                Widths::MAX_LAYERS,
+                Widths::MAX_UNITS
+            ),
             Self::Int { min } => format!("a whole number of at least {min}"),
             Self::Rate { open: false } => "a number from 0 to 1, or a schedule of such".into(),
             Self::Rate { open: true } => {
@@ -138,11 +203,17 @@ impl ParamKind {
                 (above && number <= max && number.is_finite()).then_some(ParamValue::Float(number))
             }
             (Self::Int { min }, ParamValue::Int(n)) => (n >= min).then_some(value),
-            (Self::StepSize, ParamValue::VisitCount { .. })
+            (Self::Maybe { .. }, ParamValue::Word(Self::NONE))
+            | (Self::Widths, ParamValue::Widths(_))
+            | (Self::StepSize, ParamValue::VisitCount { .. })
             | (Self::Exploration, ParamValue::Exploration(_))
             | (Self::Bool, ParamValue::Bool(_)) => Some(value),
             (Self::StepSize, _) => Self::Rate { open: true }.accept(value),
-            (Self::Bool | Self::Word(_) | Self::Int { .. } | Self::Exploration, _) => None,
+            (Self::Maybe { max }, _) => Self::Float { min: 0.0, max, open: true }.accept(value),
+            (
+                Self::Bool | Self::Word(_) | Self::Int { .. } | Self::Exploration | Self::Widths,
+                _,
+            ) => None,
             (Self::Rate { open }, _) => {
                 let schedule = match value {
                     ParamValue::Schedule(schedule) => schedule,
@@ -251,14 +322,28 @@ impl AgentConfig {
         }
     }
 
+    /// The widths of a network's layers.
+    ///
+    /// # Panics
+    /// If the agent has no such parameter: the registry's own mistake.
+    pub fn widths(&self, name: &str) -> Vec<usize> {
+        match self.params[name] {
+            ParamValue::Widths(widths) => widths.as_slice().iter().map(|n| *n as usize).collect(),
+            _ => unreachable!("{name} is a list of widths"),
+        }
+    }
+
     /// The parameters that play a part: ε does with ε-greedy behaviour only, which goes without
-    /// saying.
+    /// saying, and what is left out does not.
     pub fn in_effect(&self) -> impl Iterator<Item = (&'static str, ParamValue)> {
         let unsaid = match self.exploration() {
             Exploration::EpsilonGreedy => "exploration",
             Exploration::Softmax { .. } | Exploration::Ucb { .. } => "epsilon",
         };
-        self.params.iter().filter(move |(name, _)| **name != unsaid).map(|(k, v)| (*k, *v))
+        let plays = move |(name, value): &(&&'static str, &ParamValue)| {
+            **name != unsaid && **value != ParamValue::Word(ParamKind::NONE)
+        };
+        self.params.iter().filter(plays).map(|(k, v)| (*k, *v))
     }
 
     /// One of several words.
@@ -280,6 +365,11 @@ impl AgentConfig {
     /// Whether it learns the state values of a policy that is given.
     pub fn is_predictor(&self) -> bool {
         matches!(self.spec.build, Build::Predictor(_))
+    }
+
+    /// Whether it learns a network.
+    pub fn is_network(&self) -> bool {
+        matches!(self.spec.build, Build::Network(_))
     }
 
     /// Whether it plans on a model instead of learning from steps.

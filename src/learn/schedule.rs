@@ -89,6 +89,16 @@ impl ScheduleState {
         self.value
     }
 
+    /// How far it has come: what [`Self::restore`] needs.
+    pub fn state(&self) -> (u64, f64) {
+        (self.n, self.value)
+    }
+
+    /// As far as it was at [`Self::state`].
+    pub fn restore(&mut self, (n, value): (u64, f64)) {
+        (self.n, self.value) = (n, value);
+    }
+
     /// A step has been made.
     #[inline]
     pub fn step(&mut self) {

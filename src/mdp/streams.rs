@@ -2,10 +2,11 @@
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// A stream of random numbers: xoshiro256++ (Blackman & Vigna 2019), portable and fast.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Stream(Xoshiro256PlusPlus);
 
 impl Stream {

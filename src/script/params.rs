@@ -7,7 +7,7 @@ use super::draft::{AgentDraft, Located, Spot, captured_now};
 use super::errors::type_name;
 use super::value::Value;
 use crate::learn::registry::AgentSpec;
-use crate::learn::{Exploration, ParamKind, ParamValue, Schedule};
+use crate::learn::{Exploration, ParamKind, ParamValue, Schedule, Widths};
 
 /// What `visit_count(..)` returns: α = N(s, a)^−omega.
 #[derive(Debug, Clone, Copy)]
@@ -109,9 +109,12 @@ pub(super) fn merge_agent(
         let place = || spot(key).place();
         let Some(param) = spec.params.iter().find(|p| p.name == key.as_str()) else {
             let names: Vec<&str> = spec.params.iter().map(|p| p.name).collect();
+            let plain = key.to_lowercase().replace('-', "_");
+            let alias = spec.aliases.iter().find(|(other, _)| **other == plain);
+            let alias = alias.map(|(_, name)| format!("here it is called `{name}`"));
             return Err(Diagnostic::error(format!("`{}` has no parameter `{key}`", spec.name))
                 .at(place())
-                .maybe_hint(suggest(key, names)));
+                .maybe_hint(alias.or_else(|| suggest(key, names))));
         };
         if let (Some(_), Some(f)) = (param.function, value.clone().flatten().try_cast::<FnPtr>()) {
             let value = captured_now(f);
@@ -161,6 +164,15 @@ fn raw(value: &Dynamic, kind: ParamKind) -> ParamValue {
     if let (Some(word), ParamKind::Word(words)) = (text(&flat), kind) {
         let known = words.iter().find(|known| **known == word);
         return known.map_or(ParamValue::Float(f64::NAN), |word| ParamValue::Word(word));
+    }
+    if let (ParamKind::Maybe { .. }, Some(ParamKind::NONE)) = (kind, text(&flat).as_deref()) {
+        return ParamValue::Word(ParamKind::NONE);
+    }
+    if let (ParamKind::Widths, Ok(list)) = (kind, flat.clone().into_array()) {
+        let widths: Option<Vec<u64>> =
+            list.iter().map(|n| u64::try_from(n.clone().flatten().as_int().ok()?).ok()).collect();
+        let widths = widths.and_then(|widths| Widths::new(&widths));
+        return widths.map_or(ParamValue::Float(f64::NAN), ParamValue::Widths);
     }
     if let (ParamKind::Exploration, Some(Exploration::DEFAULT)) = (kind, text(&flat).as_deref()) {
         return ParamValue::Exploration(Exploration::EpsilonGreedy);

@@ -65,6 +65,8 @@ pub enum DiscretiserSpec {
     },
     /// No cells: features, in which values are linear.
     Features(FeatureSpec),
+    /// No cells: a network sees the numbers of the state.
+    Raw,
 }
 
 impl DiscretiserSpec {
@@ -73,7 +75,7 @@ impl DiscretiserSpec {
         let dims = match self {
             Self::Bins(dims) => dims,
             Self::Features(features) => &features.dims,
-            Self::StateIndex | Self::Cells { .. } => return None,
+            Self::StateIndex | Self::Cells { .. } | Self::Raw => return None,
         };
         dims.iter().find(|d| d.field == field)
     }
@@ -206,6 +208,7 @@ impl Variant {
         };
         let discretiser = match &self.discretiser {
             DiscretiserSpec::StateIndex => Json::from("state_index"),
+            DiscretiserSpec::Raw => Json::from("raw"),
             DiscretiserSpec::Bins(dims) => serde_json::json!({ "bins": list(dims) }),
             DiscretiserSpec::Features(FeatureSpec { kind: FeatureKind::Tiles(n), dims }) => {
                 serde_json::json!({ "tiles": list(dims), "tilings": n })

@@ -11,6 +11,7 @@ use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{DiscretiserDraft, ExperimentDraft, Located, StudyDraft};
 use super::features::{self, Surroundings};
 use super::freeze::{ALLOWED, OF_STEP};
+use super::network;
 use super::plan::{Callback, DiscretiserSpec, Expectation, Plan, SeedList, Variant};
 use super::value::Value;
 use super::world::{clipping_warning, dims, example_bins, physical_bins};
@@ -102,10 +103,14 @@ impl Resolver<'_> {
         let (spec, config, any) = self
             .environment(draft, warnings)?
             .ok_or_else(|| missing("env", "add, for example, `env: \"CartPole-v1\"`"))?;
-        let agent = Located {
+        let mut agent = Located {
             value: AgentConfig { spec: agent.value.spec, params: agent.value.params.clone() },
             spot: agent.spot.clone(),
         };
+        let episodes = draft.episodes.unwrap_or(EPISODES);
+        if agent.value.is_network() {
+            network::resolve(&mut agent.value, episodes).map_err(|d| d.at(agent.spot.place()))?;
+        }
         let schema = any.schema();
         let setting = &draft.setting;
         let normalise = match &setting.normalise {
@@ -149,7 +154,7 @@ impl Resolver<'_> {
             agent: agent.value,
             agent_functions,
             discretiser,
-            episodes: draft.episodes.unwrap_or(EPISODES),
+            episodes,
             seeds: SeedList(draft.seeds.clone().unwrap_or_else(|| (0..SEEDS).collect())),
             max_steps: draft.max_steps.or(spec.max_steps).filter(|&n| n > 0),
             threshold,
@@ -198,6 +203,7 @@ impl Resolver<'_> {
         let without = match discretiser {
             DiscretiserSpec::Cells { .. } => "scripted cells",
             DiscretiserSpec::Features(_) => "features",
+            DiscretiserSpec::Raw => "networks",
             DiscretiserSpec::StateIndex | DiscretiserSpec::Bins(_) => "",
         };
         if !without.is_empty() {
@@ -244,8 +250,17 @@ impl Resolver<'_> {
                 "q_learning or sarsa learn without a model"
             }));
         }
+        if let (true, Some(d)) = (agent.value.is_network(), draft.discretiser.as_ref()) {
+            return Err(Diagnostic::error(format!(
+                "`{}` sees the state itself: it takes no discretiser",
+                agent.value.spec.name
+            ))
+            .at(d.spot.place())
+            .hint("leave out `discretiser`; `normalise` brings numbers into a common range"));
+        }
         match draft.discretiser.as_ref() {
             None if env.n_states().is_some() => Ok(DiscretiserSpec::StateIndex),
+            None if agent.value.is_network() => Ok(DiscretiserSpec::Raw),
             // It does not look at states.
             None if agent.value.spec.name == "random_agent" => {
                 Ok(DiscretiserSpec::Bins(vec![Dim { field: 0, lo: 0.0, hi: 1.0, n: 1 }]))

@@ -213,7 +213,12 @@ fn potential_on(
                 .at(asked.and_then(|on| on.spot.place()))
                 .hint("leave out `potential_on`: it is evaluated on the state itself"))
         }
-        (DiscretiserSpec::Features(_), _) => Ok(PhiOn::Raw),
+        (DiscretiserSpec::Raw, Some(PhiOn::Cell)) => {
+            Err(Diagnostic::error("a network has no cells to evaluate the potential on")
+                .at(asked.and_then(|on| on.spot.place()))
+                .hint("leave out `potential_on`: it is evaluated on the state itself"))
+        }
+        (DiscretiserSpec::Features(_) | DiscretiserSpec::Raw, _) => Ok(PhiOn::Raw),
         (_, on) => Ok(on.unwrap_or(PhiOn::Cell)),
     }
 }
@@ -317,6 +322,7 @@ fn advice(
     let without = match discretiser {
         DiscretiserSpec::Cells { .. } => "scripted cells",
         DiscretiserSpec::Features(_) => "features",
+        DiscretiserSpec::Raw => "networks",
         DiscretiserSpec::StateIndex | DiscretiserSpec::Bins(_) => return Ok(()),
     };
     Err(Diagnostic::error(format!("{without} have no representative to evaluate the advice on"))

@@ -82,6 +82,8 @@ impl Seen for Shielded {
 pub struct Fields {
     /// The numbers that the environment's schema names, then zeros.
     pub values: [f64; MAX_FIELDS],
+    /// The state's index, where states have one and it is asked for; else 0.
+    pub index: usize,
     /// What may be played.
     pub allowed: ActionSet,
 }
@@ -91,7 +93,7 @@ impl Seen for Fields {
 
     #[inline]
     fn cell(&self) -> usize {
-        0
+        self.index
     }
 
     #[inline]
@@ -279,6 +281,8 @@ impl<E: Env> Discretiser<E> for ShieldedCells {
 
 /// No discretisation: the agent sees the state's numbers.
 pub struct RawFields {
+    /// Number of states, where agents are to see their index; else 0.
+    pub n_states: usize,
     /// State → allowed actions; every action without one.
     pub shield: Option<Shield>,
 }
@@ -289,7 +293,7 @@ impl<E: Env> Discretiser<E> for RawFields {
     type State = Fields;
 
     fn n_cells(&self) -> usize {
-        1
+        self.n_states.max(1)
     }
 
     #[inline]
@@ -300,6 +304,7 @@ impl<E: Env> Discretiser<E> for RawFields {
             Some(shield) => shield.allowed(env, obs)?,
             None => ActionSet::ALL,
         };
-        Ok(Fields { values, allowed })
+        let index = if E::INDEXED && self.n_states > 0 { env.state_index(obs) } else { None };
+        Ok(Fields { values, index: index.unwrap_or(0), allowed })
     }
 }

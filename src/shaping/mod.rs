@@ -3,6 +3,7 @@
 //! - [`Discretiser`]: observation → what the agent sees. [`StateIndex`], [`Bins`],
 //!   [`ScriptedCells`], [`RawFields`]; [`Shield`]: the actions allowed there
 //! - [`Features`]: the state's numbers → features, for linear values; [`Tiles`], [`Fourier`]
+//! - [`Inputs`]: the state's numbers → the inputs of a network
 //! - [`Potential`]: Φ(s). [`NoPotential`], [`CellPotential`], [`EpisodePotential`], [`RawPotential`]
 //! - [`Scale`]: observation normalisation
 //! - [`RewardModel`]: the reward the agent learns from. [`NativeReward`], [`TabulatedReward`],
@@ -16,6 +17,7 @@
 mod bins;
 mod discretiser;
 mod features;
+mod inputs;
 mod potential;
 mod reward;
 mod scale;
@@ -27,6 +29,7 @@ pub use discretiser::{
     ShieldFn, Shielded, ShieldedCells, StateIndex,
 };
 pub use features::{Active, FeatureKind, FeatureSpec, Features, Fourier, MAX_WEIGHTS, Tiles};
+pub use inputs::Inputs;
 pub use potential::{
     ActionFn, AnyPotential, CellEpisodeFn, CellPhiFn, CellPotential, EpisodePotential, NoPotential,
     PhiFn, Potential, RawPotential, potential_term, shaped_model,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// From the top down.
-const FLOORS: [&str; 11] = [
+const FLOORS: [&str; 12] = [
     "cli",
     "report",
     "experiment",
@@ -11,6 +11,7 @@ const FLOORS: [&str; 11] = [
     "audit",
     "stats",
     "learn",
+    "nn",
     "shaping",
     "render",
     "env",

@@ -69,8 +69,7 @@ impl<E: Env + Clone + 'static> Learned<E> {
                 let n_cells = shape.iter().product();
                 Some(AnyCells::Scripted(ScriptedCells::new(n_cells, schema.fields.len(), cell)))
             }
-
-            DiscretiserSpec::Features(_) => None,
+            DiscretiserSpec::Features(_) | DiscretiserSpec::Raw => None,
         };
         let n_cells = cells.as_ref().map_or(1, Discretiser::<E>::n_cells);
         let mut potential = shaped::potential(host, variant, env, n_cells)?;

@@ -200,10 +200,10 @@ impl Judge<'_> {
         if variant.shaping.advice.is_some() && variant.shaping.advice_on == AdviceOn::LookBack {
             return Ok(look_back(variant));
         }
-        // Features have no cells: what is said is said of the states themselves.
+        // Features and networks have no cells: what is said is said of the states themselves.
         let on_states = matches!(
             variant.discretiser,
-            DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_)
+            DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_) | DiscretiserSpec::Raw
         );
         if let Some(advice) = &variant.shaping.advice {
             // A value that is no number is a mistake here as well.
@@ -259,11 +259,17 @@ fn beyond_states(variant: &Variant) -> Option<&'static str> {
 fn by_construction(variant: &Variant) -> Audit {
     let raw = variant.potential.is_some() && variant.potential_on == PhiOn::Raw;
     let (preserved, basis) = match (&variant.discretiser, raw, beyond_states(variant)) {
-        (DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_), _, Some(why))
+        (
+            DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_) | DiscretiserSpec::Raw,
+            _,
+            Some(why),
+        )
         | (_, false, Some(why)) => (Some(true), why),
-        (DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_), _, None) => {
-            (Some(true), "by construction: Φ is a function of the state")
-        }
+        (
+            DiscretiserSpec::StateIndex | DiscretiserSpec::Features(_) | DiscretiserSpec::Raw,
+            _,
+            None,
+        ) => (Some(true), "by construction: Φ is a function of the state"),
         (_, false, None) => {
             (Some(true), "by construction, for the discretised problem: Φ is constant on each cell")
         }

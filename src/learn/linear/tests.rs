@@ -24,7 +24,7 @@ fn features(kind: FeatureKind, dims: &[(f64, f64, usize)]) -> Features {
 fn fields(numbers: &[f64]) -> Fields {
     let mut values = [0.0; MAX_FIELDS];
     values[..numbers.len()].copy_from_slice(numbers);
-    Fields { values, allowed: ActionSet::ALL }
+    Fields { values, index: 0, allowed: ActionSet::ALL }
 }
 
 /// Greedy, with a constant step size.

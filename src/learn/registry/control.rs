@@ -80,6 +80,7 @@ pub(super) const Q_LEARNING: AgentSpec = AgentSpec {
             None => AnyAgent::tabular(QLearning::of(table(c, setup))),
         },
     },
+    aliases: &[],
     linear: Some(linear::q_learning),
 };
 
@@ -97,6 +98,7 @@ pub(super) const SARSA: AgentSpec = AgentSpec {
             None => AnyAgent::tabular(Sarsa::of(table(c, setup))),
         },
     },
+    aliases: &[],
     linear: Some(linear::sarsa),
 };
 
@@ -108,6 +110,7 @@ pub(super) const EXPECTED_SARSA: AgentSpec = AgentSpec {
         backup: Backup::Expected,
         build: |c, setup| AnyAgent::tabular(ExpectedSarsa::new(table(c, setup))),
     },
+    aliases: &[],
     linear: Some(linear::expected_sarsa),
 };
 
@@ -119,6 +122,7 @@ pub(super) const DOUBLE_Q_LEARNING: AgentSpec = AgentSpec {
         let coin = Stream::new(setup.seed, "double Q-learning");
         AnyAgent::tabular(DoubleQLearning::new(table(c, setup), c.alpha(), coin))
     }),
+    aliases: &[],
     linear: None,
 };
 
@@ -143,6 +147,7 @@ pub(super) const N_STEP_SARSA: AgentSpec = AgentSpec {
         bootstraps: true,
         build: |c, setup| AnyAgent::tabular(NStepSarsa::new(table(c, setup), c.int("n") as usize)),
     },
+    aliases: &[],
     linear: None,
 };
 
@@ -157,6 +162,7 @@ pub(super) const SARSA_LAMBDA: AgentSpec = AgentSpec {
             AnyAgent::tabular(SarsaLambda::new(table(c, setup), traces))
         },
     },
+    aliases: &[],
     linear: Some(linear::sarsa_lambda),
 };
 
@@ -168,6 +174,7 @@ pub(super) const Q_LAMBDA: AgentSpec = AgentSpec {
         let traces = traces(c, setup.n_states * setup.n_actions);
         AnyAgent::tabular(QLambda::new(table(c, setup), traces))
     }),
+    aliases: &[],
     linear: Some(linear::q_lambda),
 };
 
@@ -192,6 +199,7 @@ pub(super) const DYNA_Q: AgentSpec = AgentSpec {
         let stream = Stream::new(setup.seed, "Dyna-Q");
         AnyAgent::tabular(DynaQ::new(table(c, setup), c.int("planning_steps"), stream))
     }),
+    aliases: &[],
     linear: None,
 };
 
@@ -219,5 +227,6 @@ pub(super) const SOFT_Q_LEARNING: AgentSpec = AgentSpec {
             setup.stream,
         ))
     }),
+    aliases: &[],
     linear: None,
 };

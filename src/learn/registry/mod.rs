@@ -6,12 +6,14 @@
 mod control;
 mod linear;
 mod monte_carlo;
+mod network;
 mod planners;
 mod prediction;
 mod shared;
 
 pub use self::linear::BuildLinear;
 use super::control::{Advised, Backup};
+use super::dqn::{Dqn, NetworkSetup};
 use super::params::{AgentConfig, ParamSpec};
 use super::planning::Planner;
 use super::prediction::GivenPolicy;
@@ -81,6 +83,8 @@ pub enum Build {
         /// What its target bootstraps from.
         backup: Backup,
     },
+    /// A learner of a network.
+    Network(fn(&AgentConfig, NetworkSetup) -> Dqn),
     /// A planner, which needs the environment's finite model.
     Planner(fn(&AgentConfig) -> Box<dyn Planner>),
 }
@@ -96,6 +100,8 @@ pub struct AgentSpec {
     pub params: &'static [ParamSpec],
     /// How it is built.
     pub build: Build,
+    /// What others call its parameters, each with the name here: for suggestions.
+    pub aliases: &'static [(&'static str, &'static str)],
     /// How it is built where values are linear in features, if it can learn such.
     pub linear: Option<BuildLinear>,
 }
@@ -111,7 +117,9 @@ impl AgentSpec {
         match self.build {
             Build::OnPolicy { .. } => true,
             Build::OneStep { backup, .. } => backup != Backup::Best,
-            Build::Learner(_) | Build::Predictor(_) | Build::Planner(_) => false,
+            Build::Learner(_) | Build::Predictor(_) | Build::Network(_) | Build::Planner(_) => {
+                false
+            }
         }
     }
 
@@ -201,6 +209,8 @@ pub static AGENTS: &[AgentSpec] = &[
     control::Q_LAMBDA,
     control::DYNA_Q,
     control::SOFT_Q_LEARNING,
+    network::DQN,
+    network::DOUBLE_DQN,
     planners::VALUE_ITERATION,
     planners::POLICY_ITERATION,
     planners::RANDOM_AGENT,

@@ -37,6 +37,7 @@ pub(super) const MONTE_CARLO: AgentSpec = AgentSpec {
             })
         },
     },
+    aliases: &[],
     linear: None,
 };
 
@@ -52,5 +53,6 @@ pub(super) const OFF_POLICY_MONTE_CARLO: AgentSpec = AgentSpec {
             setup.stream,
         ))
     }),
+    aliases: &[],
     linear: None,
 };

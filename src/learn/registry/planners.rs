@@ -32,6 +32,7 @@ pub(super) const VALUE_ITERATION: AgentSpec = AgentSpec {
             max_sweeps: c.int("max_sweeps") as usize,
         })
     }),
+    aliases: &[],
     linear: None,
 };
 
@@ -40,6 +41,7 @@ pub(super) const POLICY_ITERATION: AgentSpec = AgentSpec {
     doc: "policy iteration with exact evaluation, then greedy play (Sutton & Barto 4.3)",
     params: &[GAMMA],
     build: Build::Planner(|c| Box::new(PolicyIteration { gamma: c.float("gamma") })),
+    aliases: &[],
     linear: None,
 };
 
@@ -50,6 +52,7 @@ pub(super) const RANDOM_AGENT: AgentSpec = AgentSpec {
     build: Build::Learner(|c, setup| {
         AnyAgent::tabular(RandomAgent::new(setup.n_actions, c.float("gamma"), setup.stream))
     }),
+    aliases: &[],
     linear: Some(|c, setup| {
         Box::new(RandomAgent::new(setup.n_actions, c.float("gamma"), setup.stream))
     }),

@@ -44,6 +44,7 @@ pub(super) const MC_PREDICTION: AgentSpec = AgentSpec {
         let visits = Visits::of_word(c.word("visits"));
         predictor(c, setup, |n_states| MonteCarloPrediction::new(visits, n_states))
     }),
+    aliases: &[],
     linear: None,
 };
 
@@ -52,6 +53,7 @@ pub(super) const TD0: AgentSpec = AgentSpec {
     doc: "V of a given policy by TD(0) (Sutton 1988; Sutton & Barto 6.1)",
     params: &[POLICY, STEP_SIZE, GAMMA, INITIAL_V],
     build: Build::Predictor(|c, setup| predictor(c, setup, |_| Td0::default())),
+    aliases: &[],
     linear: None,
 };
 
@@ -62,6 +64,7 @@ pub(super) const TD_LAMBDA: AgentSpec = AgentSpec {
     build: Build::Predictor(|c, setup| {
         predictor(c, setup, |n_states| TdLambda::new(traces(c, n_states)))
     }),
+    aliases: &[],
     linear: None,
 };
 
@@ -85,5 +88,6 @@ pub(super) const N_STEP_TD: AgentSpec = AgentSpec {
         let n = c.int("n") as usize;
         predictor(c, setup, |_| NStepTd::new(n))
     }),
+    aliases: &[],
     linear: None,
 };
