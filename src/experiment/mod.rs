@@ -50,5 +50,5 @@ pub use store::{
     Store, StoreError, StoredUnit, holds_weights, read_table, read_weights, write_atomically,
     write_atomically_with,
 };
-pub use train::{Limits, TrainError, World, train};
+pub use train::{Limits, Solved, TrainError, World, train};
 pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};
