@@ -43,14 +43,14 @@ def target():
     return Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 
 
-def make_python():
+def make_python(name="peers-venv", requirements="requirements.txt"):
     """A virtual environment with the pinned packages."""
-    venv = target() / "peers-venv"
+    venv = target() / name
     python = venv / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
-        requirements = str(HERE / "requirements.txt")
-        subprocess.run([str(python), "-m", "pip", "install", "-q", "-r", requirements], check=True)
+        install = [python, "-m", "pip", "install", "-q", "-r", HERE / requirements]
+        subprocess.run([str(c) for c in install], check=True)
     return python
 
 

@@ -122,7 +122,8 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     }
     let seeds = counted(v.seeds.0.len(), "seed");
     let episodes = counted(v.episodes as usize, "episode");
-    rows.push(("training", format!("{seeds} × {episodes} {limit}")));
+    let until = if v.stop_when_solved { ", each seed until solved" } else { "" };
+    rows.push(("training", format!("{seeds} × {episodes} {limit}{until}")));
     let solved = v.threshold.map_or(String::new(), |x| format!(", solved at {x}"));
     rows.push((
         "measured",

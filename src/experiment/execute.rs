@@ -12,7 +12,8 @@ use crate::script::{Diagnostic, Host, Plan};
 /// How a run is going; read by whoever shows it.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Episodes finished, stored units included.
+    /// Episodes finished, stored units included; with a unit that stops early also those that it
+    /// need not play.
     pub episodes: AtomicU64,
     /// Steps made in this run.
     pub steps: AtomicU64,
@@ -163,6 +164,8 @@ fn one(
         Err(UnitError::Script(d)) => return Err(Some(ExecuteError::Script(d))),
     };
     let seconds = start.elapsed().as_secs_f64();
+    let unplayed = u64::from(variant.episodes) - record.rows.len() as u64;
+    progress.episodes.fetch_add(unplayed, Ordering::Relaxed);
     store.commit(unit, variant, &record).map_err(|e| Some(e.into()))?;
     Ok(Finished { unit: unit.clone(), steps: record.steps(), seconds })
 }

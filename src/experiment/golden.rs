@@ -56,6 +56,11 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
     if let DiscretiserSpec::Features(features) = &variant.discretiser {
         writeln!(out, "  features {features}").expect(MEMORY);
     }
+    if let Some(threshold) = variant.stops_at() {
+        let window = variant.window;
+        writeln!(out, "  stops at a mean return of {threshold} over {window} episodes")
+            .expect(MEMORY);
+    }
     let audit = audit_variant(host, variant, None)?;
     exact(&audit, out);
     let look = look(variant)?;

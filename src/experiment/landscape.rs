@@ -170,8 +170,6 @@ pub struct Landscape {
     shield: Option<ShieldFn>,
     locate: Option<Locate>,
     phi: Option<PhiFn>,
-    /// In which episode Φ is taken.
-    last_episode: u32,
     /// Whether Φ is taken at the cell's representative, as in training.
     on_cell: bool,
 }
@@ -200,7 +198,6 @@ impl Landscape {
             schema,
             locate,
             phi,
-            last_episode: variant.episodes,
         })
     }
 
@@ -232,12 +229,17 @@ impl Landscape {
         }
     }
 
-    /// Φ as the learner meets it, at the end of training, in a state of `cell` with these fields;
+    /// Φ as the learner meets it in an episode (from 1), in a state of `cell` with these fields;
     /// `None` without one. What the learner's own values add to it is not in it.
     ///
     /// # Errors
     /// If the callback fails.
-    pub fn phi(&mut self, cell: usize, fields: &[f64]) -> Result<Option<f64>, Diagnostic> {
+    pub fn phi(
+        &mut self,
+        cell: usize,
+        fields: &[f64],
+        episode: u32,
+    ) -> Result<Option<f64>, Diagnostic> {
         let Some(phi) = &mut self.phi else { return Ok(None) };
         let mut state = [0.0; MAX_FIELDS];
         let n_fields = self.schema.fields.len();
@@ -248,7 +250,7 @@ impl Landscape {
             }
             _ => state[..n_fields].copy_from_slice(fields),
         }
-        phi(&state[..n_fields], self.last_episode).map(Some).map_err(diagnostic_of)
+        phi(&state[..n_fields], episode).map(Some).map_err(diagnostic_of)
     }
 }
 

@@ -50,5 +50,5 @@ pub use store::{
     Checkpoint, Model, Store, StoreError, StoredUnit, holds_model, holds_weights, read_model,
     read_table, read_weights, write_atomically, write_atomically_with,
 };
-pub use train::{Limits, TrainError, World, train};
+pub use train::{Limits, Solved, TrainError, World, train};
 pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};

@@ -106,27 +106,29 @@ pub struct Learned {
     pub values: Values,
     /// Whether anything was learned in a state (or of a feature), one flag each.
     pub experienced: Vec<bool>,
+    /// In how many episodes.
+    pub episodes: u32,
 }
 
 impl Learned {
     /// As a shield leaves it that allows `allowed`, one set per state: refused actions are worth −∞.
     #[must_use]
     pub fn behind(self, allowed: &[ActionSet]) -> Self {
-        let Self { values: Values::Q(q), experienced } = self else { return self };
+        let Self { values: Values::Q(q), experienced, episodes } = self else { return self };
         let n_actions = q.n_actions();
         let behind = q.values().iter().enumerate().map(|(i, &value)| {
             let refused = !allowed[i / n_actions].contains(i % n_actions);
             if refused { f64::NEG_INFINITY } else { value }
         });
         let q = QTable::from_values(n_actions, behind.collect());
-        Self { values: Values::Q(q), experienced }
+        Self { values: Values::Q(q), experienced, episodes }
     }
 
     /// Of weights of `features`: the values at `states`, a row each. Something was learned where it
     /// was of one of the state's features.
     #[must_use]
     pub fn at(self, features: &Features, states: &[Vec<f64>]) -> Self {
-        let Self { values: Values::Q(weights), experienced } = self else { return self };
+        let Self { values: Values::Q(weights), experienced, episodes } = self else { return self };
         let mut active = features.active();
         let mut known = |state: &Vec<f64>| {
             features.see(state, &mut active);
@@ -134,7 +136,7 @@ impl Learned {
         };
         let experienced = states.iter().map(&mut known).collect();
         let q = LinearQ::from_weights(features.clone(), weights).table(states);
-        Self { values: Values::Q(q), experienced }
+        Self { values: Values::Q(q), experienced, episodes }
     }
 }
 

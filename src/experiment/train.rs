@@ -8,6 +8,7 @@ use crate::learn::{Last, Learn, Seen};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Ending, Env, Step};
 use crate::shaping::{Discretiser, Fault, Potential, RewardModel, Transition, potential_term};
+use crate::stats::is_solved;
 
 /// Everything an agent meets, seen through a discretiser and a reward model.
 pub struct World<E, D, P, R> {
@@ -38,6 +39,18 @@ pub struct Limits {
     /// Draws the first state of every episode from all that the environment's model can reach, by
     /// a stream of this seed, instead of the environment's own.
     pub exploring_starts: Option<u64>,
+    /// Ends training before all episodes are played.
+    pub stop_when: Option<Solved>,
+}
+
+/// When a task counts as solved: after the first episode at which the mean of the native returns of
+/// the last `window` ones is at least `threshold`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solved {
+    /// The mean return.
+    pub threshold: f64,
+    /// Number of episodes, 1 or more.
+    pub window: usize,
 }
 
 impl Limits {
@@ -49,6 +62,7 @@ impl Limits {
         frame_skip: 1,
         clip_reward: None,
         exploring_starts: None,
+        stop_when: None,
     };
 }
 
@@ -77,8 +91,9 @@ pub enum TrainError {
 /// Steps between looks at the stop flag in an endless episode.
 const STOP_INTERVAL: u32 = 1 << 16;
 
-/// Plays `limits.episodes` episodes, teaching `agent`; calls `each` after every one,
-/// with the agent as it is by then.
+/// Plays `limits.episodes` episodes, or up to the one that solves the task where
+/// `limits.stop_when` asks for that, teaching `agent`; calls `each` after every one, with the agent
+/// as it is by then.
 ///
 /// The reward learned from is `reward(t) + γΦ(s′) − Φ(s)`, with Φ(s′) = 0 on termination. On
 /// truncation Φ(s′) is kept if and only if the agent bootstraps from s′: both sides must speak of
@@ -103,6 +118,7 @@ where
     A: Learn<D::State>,
 {
     let mut starts = limits.exploring_starts.and_then(|seed| Starts::new(&world.env, seed));
+    let mut returns = Vec::new();
     for episode in 0..limits.episodes {
         if stop.load(Ordering::Relaxed) {
             return Err(TrainError::Interrupted);
@@ -110,7 +126,16 @@ where
         world.potential.begin_episode(episode + 1);
         match play(world, agent, limits, starts.as_mut(), rng, stop) {
             Ok(row) if !row.learned.is_finite() => return Err(TrainError::NotFinite { episode }),
-            Ok(row) => each(row, agent),
+            Ok(row) => {
+                let native = row.native;
+                each(row, agent);
+                if let Some(Solved { threshold, window }) = limits.stop_when {
+                    returns.push(native);
+                    if is_solved(&returns, window, threshold) {
+                        break;
+                    }
+                }
+            }
             Err((None, _)) => return Err(TrainError::Interrupted),
             Err((Some(fault), step)) => return Err(TrainError::Fault { fault, episode, step }),
         }

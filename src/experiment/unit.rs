@@ -8,7 +8,7 @@ use super::assemble::Assembled;
 use super::predict::Exact;
 use super::record::{EpisodeRow, StateValues, TrainedNetwork, UnitRecord};
 use super::store::Checkpoint;
-use super::train::{Limits, TrainError, World, train};
+use super::train::{Limits, Solved, TrainError, World, train};
 use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
 use crate::learn::planning::Sweep;
@@ -298,6 +298,9 @@ impl RunUnit<'_> {
             frame_skip: variant.frame_skip,
             clip_reward: variant.clip_reward,
             exploring_starts: variant.agent.is_on("exploring_starts").then_some(seed),
+            stop_when: variant
+                .stops_at()
+                .map(|threshold| Solved { threshold, window: variant.window as usize }),
         };
         let Extra { sweeps, exact } = extra;
         let spacing = exact.as_ref().map_or(0, |exact| exact.spacing(limits.episodes));

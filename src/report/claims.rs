@@ -35,7 +35,7 @@ pub fn rehearse(plan: &Plan) -> Result<(), Diagnostic> {
         let returns = vec![vec![1.0]; variant.seeds.0.len()];
         let lengths = vec![vec![1]; variant.seeds.0.len()];
         let threshold = variant.threshold.map(|_| 1.0);
-        let mut summary = summarise(&variant.name, &returns, &lengths, 1, threshold);
+        let mut summary = summarise(&variant.name, &returns, &lengths, 1, 1, threshold);
         if has_exact_values(&host, variant)? {
             let error = || Some(OverSeeds::of(&vec![1.0; returns.len()]));
             summary = VariantSummary {

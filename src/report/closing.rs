@@ -2,8 +2,16 @@
 
 use super::compare::against_baseline;
 use super::results::Findings;
+use super::summary::VariantSummary;
 use super::table::{StudyTable, TableRow};
-use crate::script::Plan;
+use crate::script::{Plan, Variant};
+
+/// How many seeds of a variant stopped before its last episode.
+pub(super) fn stopped(variant: &Variant, summary: &VariantSummary) -> usize {
+    let solved = summary.solved.as_ref().filter(|_| variant.stop_when_solved);
+    let first = solved.iter().flat_map(|solved| solved.first_episode.iter().flatten());
+    first.filter(|episode| **episode < summary.episodes).count()
+}
 
 /// The table of a study's findings.
 pub fn closing_table(plan: &Plan, findings: &Findings) -> StudyTable {
@@ -25,6 +33,21 @@ pub fn closing_table(plan: &Plan, findings: &Findings) -> StudyTable {
              policy reaches; IQM over seeds"
                 .into(),
         );
+    }
+    let stopped: Vec<String> = plan
+        .variants
+        .iter()
+        .zip(&findings.summaries)
+        .map(|(v, s)| (stopped(v, s), s))
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, s)| format!("{} ({n} of {} seeds)", s.name, s.seeds))
+        .collect();
+    if !stopped.is_empty() {
+        notes.push(format!(
+            "stopped when solved: {}; their final return is the mean that reached the threshold, \
+             not what more training would give",
+            stopped.join(", ")
+        ));
     }
     // Nobody can act on a verdict that says only that there is none.
     let undecided = plan.variants.iter().zip(&findings.audits);

@@ -1,5 +1,6 @@
 //! Variants against the study's baseline, paired by seed.
 
+use super::closing::stopped;
 use super::summary::VariantSummary;
 use crate::script::Plan;
 use crate::stats::{Estimator, interval, mean};
@@ -21,8 +22,14 @@ pub fn against_baseline(plan: &Plan, summaries: &[VariantSummary]) -> Vec<String
         let differences: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
         let bounds = interval(&differences, Estimator::Mean)
             .map_or(String::new(), |i| format!(" [{:+.1}, {:+.1}]", i.low, i.high));
+        let stopped = |i: usize| stopped(&plan.variants[i], &summaries[i]) > 0;
+        let unequal = if stopped(i) || stopped(reference) {
+            ", after unequal numbers of episodes"
+        } else {
+            ""
+        };
         lines.push(format!(
-            "{} against {baseline}: {:+.1}{bounds}, paired over {} seeds",
+            "{} against {baseline}: {:+.1}{bounds}, paired over {} seeds{unequal}",
             variant.name,
             mean(&differences),
             differences.len()

@@ -141,6 +141,9 @@ fn subtitle(plot: &CurvesPlot) -> String {
     } else {
         ", no band: one run shows no spread"
     });
+    if plot.curves.iter().any(|c| c.band.carried > 0) {
+        subtitle.push_str(", stopped seeds carried forward");
+    }
     subtitle
 }
 
@@ -151,7 +154,15 @@ fn description(plot: &CurvesPlot, subtitle: &str) -> String {
         format!("{}{} over episodes; {subtitle}.", quantity[..1].to_uppercase(), &quantity[1..]);
     for Curve { name, band } in &plot.curves {
         if let (Some(episode), Some(&end)) = (band.episode.last(), band.iqm.last()) {
-            let _ = write!(words, " {name}: {} after {episode} episodes.", number(end));
+            let _ = write!(words, " {name}: {} after {episode} episodes", number(end));
+            if band.carried > 0 {
+                let _ = write!(
+                    words,
+                    ", {} of {} seeds stopped before and carried forward",
+                    band.carried, band.seeds
+                );
+            }
+            words.push('.');
         }
     }
     words

@@ -6,10 +6,15 @@ use crate::stats::curve_band;
 fn plot(threshold: Option<f64>, curves: &[(&str, Vec<Vec<f64>>)]) -> CurvesPlot {
     let curves = curves
         .iter()
-        .map(|(name, runs)| Curve { name: (*name).into(), band: curve_band(runs, 20) })
+        .map(|(name, runs)| Curve { name: (*name).into(), band: band(runs) })
         .collect();
     let (title, quantity) = ("a <study> & more".into(), NATIVE_RETURN);
     CurvesPlot { title, quantity, window: Some(20), threshold, curves }
+}
+
+/// Up to the end of the longest run.
+fn band(runs: &[Vec<f64>]) -> CurveBand {
+    curve_band(runs, 20, runs.iter().map(Vec::len).max().unwrap_or(0))
 }
 
 /// Seeds that learn a little earlier or later, from −200 towards −100.
@@ -87,6 +92,19 @@ fn one_seed_has_no_band_and_says_so() {
 }
 
 #[test]
+fn stopped_seeds_are_carried_forward_and_the_plot_says_so() {
+    let mut runs = learning(5, 400);
+    let whole = curves_svg(&plot(None, &[("plain", runs.clone())]));
+    assert!(!whole.contains("stopped") && !whole.contains("carried"));
+    runs[1].truncate(150);
+    runs[3].truncate(200);
+    let svg = curves_svg(&plot(None, &[("plain", runs)]));
+    well_formed(&svg);
+    assert!(svg.contains("interval of the IQM, stopped seeds carried forward</text>"), "{svg}");
+    assert!(svg.contains(" after 400 episodes, 2 of 5 seeds stopped before and carried forward."));
+}
+
+#[test]
 fn odd_curves_are_drawn_all_the_same() {
     let broken = vec![(0..90).map(|e| if e / 30 == 1 { f64::NAN } else { 1.0 }).collect(); 3];
     let diverged = vec![vec![f64::NEG_INFINITY; 50]; 3];
@@ -110,6 +128,7 @@ fn a_gap_breaks_the_line() {
         low: vec![0.0; 5],
         high: vec![1.0; 5],
         seeds: 1,
+        carried: 0,
         method: None,
     };
     let scale = Scale { low: 0.0, high: 10.0, from: 0.0, to: 10.0 };

@@ -103,10 +103,23 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// Whose numbers a picture shows.
-    fn whose(&self, quantity: Quantity) -> String {
+    /// The last episode of training: one for each seed where Φ changes with the episode and they
+    /// stopped at different ones, else one for all.
+    fn ends(&self, variant: &Variant) -> Vec<u32> {
+        let mut ends: Vec<u32> = self.learned.iter().map(|one| one.episodes).collect();
+        if !variant.is_dynamic() || ends.windows(2).all(|two| two[0] == two[1]) {
+            ends.truncate(1);
+        }
+        ends
+    }
+
+    /// Whose numbers a picture shows; `ends` are those of [`Self::ends`].
+    fn whose(&self, quantity: Quantity, ends: &[u32]) -> String {
         match (self.seeds.as_slice(), quantity) {
-            (_, Quantity::Potential) => "the same for every seed".into(),
+            (_, Quantity::Potential) if ends.len() == 1 => "the same for every seed".into(),
+            (seeds, Quantity::Potential) => {
+                format!("mean over {} seeds, of each when it stopped", seeds.len())
+            }
             ([seed], _) => format!("seed {seed}"),
             (seeds, Quantity::Value) => format!("mean over {} seeds", seeds.len()),
             (seeds, Quantity::Policy) => format!("what most of {} seeds do", seeds.len()),
@@ -135,6 +148,17 @@ impl Tables {
         (n > 0).then(|| sum / f64::from(n))
     }
 
+    /// Φ of a cell: `phi` has none, one for all seeds or one for each, of which the mean over the
+    /// seeds that know the cell is taken, as of their values.
+    fn potential(&self, cell: usize, phi: &[f64]) -> Option<f64> {
+        if phi.len() < 2 {
+            return phi.first().copied();
+        }
+        let own = self.learned.iter().zip(phi).filter(|(l, _)| l.experienced[cell]);
+        let (n, sum) = own.fold((0u32, 0.0), |(n, sum), (_, phi)| (n + 1, sum + phi));
+        (n > 0).then(|| sum / f64::from(n))
+    }
+
     /// The action that most of the seeds that know a cell take there; the first of several.
     fn action(&self, cell: usize) -> Option<Action> {
         let n_actions = self.learned.first()?.values.q()?.n_actions();
@@ -150,7 +174,7 @@ impl Tables {
     /// the one that most take.
     fn actions(&self, cell: usize) -> Vec<Action> {
         match self.learned.as_slice() {
-            [Learned { values: Values::Q(q), experienced }] if experienced[cell] => {
+            [Learned { values: Values::Q(q), experienced, .. }] if experienced[cell] => {
                 tied(q.row(cell))
             }
             _ => self.action(cell).into_iter().collect(),
@@ -184,8 +208,9 @@ pub fn pictures(
     let features = landscape.features.clone();
     let own = variant.shaping.learned.unwrap_or(0.0);
     let has_potential = has_potential(variant);
+    let ends = tables.ends(variant);
     for frame in frames(&landscape, variant, request, &learned)? {
-        let cells = spots(&mut landscape, &frame)?;
+        let cells = spots(&mut landscape, &frame, &ends)?;
         let at_places = features.as_ref().map(|features| tables.at_places(features, &frame));
         let tables = at_places.as_ref().unwrap_or(tables);
         for &quantity in quantities {
@@ -201,15 +226,16 @@ pub fn pictures(
             {
                 continue;
             }
-            let of = |spot: &Spot| match *spot {
+            let of = |spot: &Spot| match spot {
                 None => Place::Nothing,
                 Some((cell, phi)) => {
-                    let value = tables.value(cell);
+                    let value = tables.value(*cell);
+                    let phi = tables.potential(*cell, phi);
                     let phi =
                         if own == 0.0 { phi } else { value.map(|v| phi.unwrap_or(0.0) + own * v) };
                     let known = match quantity {
                         Quantity::Value => value.map(|v| v + phi.unwrap_or(0.0)),
-                        Quantity::Policy => tables.action(cell).map(|a| a as f64),
+                        Quantity::Policy => tables.action(*cell).map(|a| a as f64),
                         Quantity::Potential => phi,
                     };
                     known.map_or(Place::Unknown, Place::Known)
@@ -218,7 +244,7 @@ pub fn pictures(
             let grid = landscape.schema.grid.as_ref().filter(|_| frame.is_map);
             pictures.push(Picture {
                 variant: variant.name.clone(),
-                seeds: tables.whose(quantity),
+                seeds: tables.whose(quantity, &ends),
                 quantity,
                 label: label(variant, quantity),
                 at: frame.at.clone(),
@@ -233,11 +259,11 @@ pub fn pictures(
     Ok(pictures)
 }
 
-/// The row of the table at a place, and Φ there; `None` where no episode can be and act. Without a
+/// The row of the table at a place, and Φ there at each end of training, if there is one; `None` where no episode can be and act. Without a
 /// table the place's own number stands for the row (see [`Tables::at_places`]).
-type Spot = Option<(usize, Option<f64>)>;
+type Spot = Option<(usize, Vec<f64>)>;
 
-fn spots(landscape: &mut Landscape, frame: &Frame) -> Result<Vec<Spot>, StoredError> {
+fn spots(landscape: &mut Landscape, frame: &Frame, ends: &[u32]) -> Result<Vec<Spot>, StoredError> {
     let mut cells = Vec::with_capacity(frame.x.n * frame.y.n);
     for (i, j) in (0..frame.y.n).flat_map(|j| (0..frame.x.n).map(move |i| (i, j))) {
         let state = if let Some(states) = &landscape.states {
@@ -252,7 +278,11 @@ fn spots(landscape: &mut Landscape, frame: &Frame) -> Result<Vec<Spot>, StoredEr
         };
         cells.push(match state {
             None => None,
-            Some((cell, fields)) => Some((cell, landscape.phi(cell, &fields)?)),
+            Some((cell, fields)) => {
+                let at = |&end| landscape.phi(cell, &fields, end).transpose();
+                let phi: Result<Vec<f64>, _> = ends.iter().filter_map(at).collect();
+                Some((cell, phi?))
+            }
         });
     }
     Ok(cells)

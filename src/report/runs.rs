@@ -4,7 +4,7 @@ use super::curves::Curve;
 use super::summary::{OverSeeds, VariantSummary, summarise};
 use crate::experiment::StoredUnit;
 use crate::script::Variant;
-use crate::stats::{auc, curve_band};
+use crate::stats::{curve_band, mean};
 
 /// What tables and plots need of a variant's units.
 #[derive(Debug, Default)]
@@ -43,14 +43,14 @@ impl Runs {
 
     /// Their statistics.
     pub(super) fn summary(&self, variant: &Variant) -> VariantSummary {
-        let window = variant.window as usize;
-        let summary =
-            summarise(&variant.name, &self.returns, &self.lengths, window, variant.threshold);
+        let Variant { name, threshold, .. } = variant;
+        let (episodes, window) = (variant.episodes as usize, variant.window as usize);
+        let summary = summarise(name, &self.returns, &self.lengths, episodes, window, *threshold);
         if self.errors.is_empty() {
             return summary;
         }
         let last: Vec<f64> = self.errors.iter().filter_map(|run| run.last().copied()).collect();
-        let areas: Vec<f64> = self.errors.iter().map(|run| auc(run)).collect();
+        let areas: Vec<f64> = self.errors.iter().map(|run| mean(run)).collect();
         VariantSummary {
             value_error: Some(OverSeeds::of(&last)),
             value_error_max: Some(OverSeeds::of(&self.largest)),
@@ -59,14 +59,16 @@ impl Runs {
         }
     }
 
-    /// The learning curve of the native returns.
+    /// The learning curve of the native returns. It ends where every seed has stopped.
     pub(super) fn curve(&self, variant: &Variant) -> Curve {
-        let band = curve_band(&self.returns, variant.window as usize);
+        let longest = self.returns.iter().map(Vec::len).max().unwrap_or(0);
+        let band = curve_band(&self.returns, variant.window as usize, longest);
         Curve { name: variant.name.clone(), band }
     }
 
     /// The curve of the errors.
     pub(super) fn error_curve(&self, variant: &Variant) -> Curve {
-        Curve { name: variant.name.clone(), band: curve_band(&self.errors, 1) }
+        let band = curve_band(&self.errors, 1, variant.episodes as usize);
+        Curve { name: variant.name.clone(), band }
     }
 }

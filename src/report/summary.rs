@@ -64,15 +64,16 @@ pub struct VariantSummary {
     pub name: String,
     /// Number of seeds.
     pub seeds: usize,
-    /// Episodes per seed (of the longest run).
+    /// Episodes per seed; a seed that stops when it has solved the task plays fewer.
     pub episodes: usize,
     /// The window of rolling means, in episodes.
     pub window: usize,
     /// The return that counts as solved, if the environment or the script names one.
     pub threshold: Option<f64>,
-    /// The rolling mean at each seed's last episode.
+    /// The rolling mean at the last episode that each seed played.
     pub final_return: OverSeeds,
     /// Each seed's mean return over all episodes: the area under its learning curve, per episode.
+    /// What a seed did not play counts as its last rolling mean.
     pub auc: OverSeeds,
     /// When the threshold was reached; `None` without a threshold.
     pub solved: Option<Solved>,
@@ -86,7 +87,7 @@ pub struct VariantSummary {
     /// The mean of the errors after each episode.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value_error_auc: Option<OverSeeds>,
-    /// Mean steps per episode, over all episodes of all seeds.
+    /// Mean steps per episode, over all episodes that were played.
     pub mean_steps: f64,
     /// The values behind `final_return`, `[seeds]`.
     pub final_returns: Vec<f64>,
@@ -97,8 +98,8 @@ pub struct VariantSummary {
 /// Summarises one variant.
 ///
 /// `returns` are native returns, `[seeds][episodes]`; `lengths` steps per episode, the same shape;
-/// `window` is that of the rolling mean, in episodes. Runs may differ in length. A seed without
-/// episodes makes its final return NaN.
+/// `episodes` is how many a seed plays that does not stop early, `window` that of the rolling mean,
+/// in episodes. A seed without episodes makes its final return NaN.
 ///
 /// # Panics
 /// If `window` is 0.
@@ -106,6 +107,7 @@ pub fn summarise(
     name: &str,
     returns: &[Vec<f64>],
     lengths: &[Vec<u32>],
+    episodes: usize,
     window: usize,
     threshold: Option<f64>,
 ) -> VariantSummary {
@@ -116,15 +118,23 @@ pub fn summarise(
             played => rolling_mean_at(run, window, played),
         })
         .collect();
-    let areas: Vec<f64> = returns.iter().map(|run| auc(run)).collect();
+    let areas: Vec<f64> = returns.iter().map(|run| auc(run, window, episodes)).collect();
     // Whole numbers: the sum is exact in any order.
     let steps: u64 = lengths.iter().flatten().map(|&n| u64::from(n)).sum();
     let episodes_in_all: usize = lengths.iter().map(Vec::len).sum();
-    let warnings = warnings(returns.len(), &final_returns);
+    let mut warnings = warnings(returns.len(), &final_returns);
+    let stopped = returns.iter().filter(|run| run.len() < episodes).count();
+    if stopped > 0 {
+        warnings.push(format!(
+            "{stopped} of {} seeds stopped before episode {episodes}: their final return is the rolling \
+             mean at which they did, and their area carries it forward",
+            returns.len()
+        ));
+    }
     VariantSummary {
         name: name.to_owned(),
         seeds: returns.len(),
-        episodes: returns.iter().map(Vec::len).max().unwrap_or(0),
+        episodes,
         window,
         threshold,
         final_return: OverSeeds::of(&final_returns),
@@ -180,7 +190,7 @@ mod tests {
     #[test]
     fn a_variant_by_hand() {
         let (returns, lengths) = runs();
-        let s = summarise("plain", &returns, &lengths, 2, Some(9.0));
+        let s = summarise("plain", &returns, &lengths, 4, 2, Some(9.0));
         assert_eq!(s.final_returns, [10.0, 10.0, 1.0, 2.0]);
         // The IQM of four drops the least and the greatest: (2 + 10) / 2.
         assert_eq!((s.final_return.mean, s.final_return.iqm), (5.75, 6.0));
@@ -196,20 +206,44 @@ mod tests {
     }
 
     #[test]
+    fn seeds_that_stop_when_solved_stay_comparable() {
+        let (mut returns, mut lengths) = runs();
+        // The second seed reaches the threshold with the third episode and stops.
+        returns[1].pop();
+        lengths[1].pop();
+        let s = summarise("plain", &returns, &lengths, 4, 2, Some(9.0));
+        let all = summarise("plain", &runs().0, &runs().1, 4, 2, Some(9.0));
+        // It would have gone on as it stopped: nothing but the steps differs.
+        assert_eq!((s.episodes, &s.auc, &s.final_returns), (4, &all.auc, &all.final_returns));
+        assert_eq!(s.solved, all.solved);
+        // 20 + 30 + 80 + 10 steps in 15 episodes.
+        assert_eq!(s.mean_steps, 140.0 / 15.0);
+        let warned = |s: &VariantSummary| s.warnings.iter().any(|w| w.starts_with("1 of 4 seeds"));
+        assert!(warned(&s) && !warned(&all));
+        // Stopped at a lower mean, it is carried forward at that.
+        returns[1] = vec![0.0, 8.0];
+        lengths[1] = vec![10; 2];
+        let s = summarise("plain", &returns, &lengths, 4, 2, Some(4.0));
+        assert_eq!(s.final_returns[1], 4.0);
+        // Areas 5, (8 + 2 * 4) / 4, 0.5, 1.
+        assert_eq!(s.auc.mean, 10.5 / 4.0);
+    }
+
+    #[test]
     fn never_solved_one_seed_and_no_threshold() {
         let (returns, lengths) = runs();
-        let s = summarise("plain", &returns[2..3], &lengths[2..3], 2, Some(9.0));
+        let s = summarise("plain", &returns[2..3], &lengths[2..3], 4, 2, Some(9.0));
         assert_eq!(s.solved.unwrap().median_episode, None);
         assert_eq!((s.final_return.low, s.final_return.method), (None, None));
         assert!(s.warnings[0].contains("no interval"));
-        assert_eq!(summarise("plain", &returns, &lengths, 2, None).solved, None);
+        assert_eq!(summarise("plain", &returns, &lengths, 4, 2, None).solved, None);
     }
 
     #[test]
     fn a_diverged_seed_is_named_not_hidden() {
         let (mut returns, lengths) = runs();
         returns[2][3] = f64::NAN;
-        let s = summarise("plain", &returns, &lengths, 2, Some(9.0));
+        let s = summarise("plain", &returns, &lengths, 4, 2, Some(9.0));
         assert!(s.final_return.iqm.is_nan() && s.final_return.interval().is_none());
         assert!(s.warnings.iter().any(|w| w.starts_with("1 of 4 seeds ended")), "{:?}", s.warnings);
     }
@@ -220,7 +254,7 @@ mod tests {
             (0..12).map(|s| (0..50).map(|e| f64::from(e * (s % 5)) / 7.0).collect()).collect();
         let lengths = vec![vec![3; 50]; 12];
         let write = || {
-            let summary = summarise("plain", &returns, &lengths, 20, Some(20.0));
+            let summary = summarise("plain", &returns, &lengths, 50, 20, Some(20.0));
             (serde_json::to_string(&summary).unwrap(), summary)
         };
         let (text, summary) = write();

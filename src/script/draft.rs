@@ -93,6 +93,7 @@ pub(super) struct ExperimentDraft {
     pub(super) max_steps: Option<u32>,
     pub(super) threshold: Option<f64>,
     pub(super) window: Option<u32>,
+    pub(super) stop_when_solved: Option<Located<bool>>,
     pub(super) setting: SettingDraft,
     pub(super) shaping: ShapingDraft,
     pub(super) reward: Option<Located<FnPtr>>,
@@ -208,6 +209,12 @@ impl ExperimentDraft {
             "threshold" => {
                 let finite = number(value).filter(|x| x.is_finite());
                 self.threshold = Some(finite.ok_or_else(|| wrong(key, "a finite number", value))?);
+            }
+            "stop_when_solved" if removed => self.stop_when_solved = None,
+            "stop_when_solved" => {
+                let stop = value.clone().flatten().as_bool();
+                let stop = stop.map_err(|_| wrong(key, "true or false", value))?;
+                self.stop_when_solved = Some(Located { value: stop, spot: spot(key) });
             }
             "reward" if removed => self.reward = None,
             "reward" => self.reward = Some(located(function(key, "(t) -> number", value)?)),

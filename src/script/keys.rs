@@ -49,6 +49,11 @@ pub const KEYS: &[Key] = &[
     key("threshold", "number", "rolling-mean return that counts as solved; default: Gymnasium's"),
     key("window", "integer", "episodes in the rolling mean; default 20"),
     key(
+        "stop_when_solved",
+        "bool",
+        "ends the training of a seed as soon as its rolling mean reaches the threshold",
+    ),
+    key(
         "potential",
         "|s| number, |s, episode| number or learned(eta)",
         "Φ(s): the host adds γΦ(s′) − Φ(s) with the agent's γ and Φ(terminal) = 0",

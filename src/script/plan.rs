@@ -119,6 +119,9 @@ pub struct Variant {
     pub threshold: Option<f64>,
     /// Window of the rolling mean, in episodes.
     pub window: u32,
+    /// Whether training of a seed ends as soon as the rolling mean reaches the threshold, which
+    /// there is then.
+    pub stop_when_solved: bool,
     /// Φ(s), or Φ(s, episode) if it takes two arguments.
     pub potential: Option<Callback>,
     /// On what Φ is evaluated.
@@ -191,6 +194,12 @@ impl Variant {
         self.reward.is_some() || !self.terms.is_empty() || self.clip_reward.is_some()
     }
 
+    /// The rolling mean of the native return, over a full window, at which training of a seed ends;
+    /// `None` if all episodes are played.
+    pub fn stops_at(&self) -> Option<f64> {
+        self.threshold.filter(|_| self.stop_when_solved)
+    }
+
     /// Everything that can change a result of this variant, except the seed.
     pub fn identity(&self) -> Json {
         let digest = |c: &Callback| Json::from(c.digest.as_str());
@@ -217,7 +226,7 @@ impl Variant {
             self.agent_functions.iter().map(|(k, c)| ((*k).into(), digest(c))).collect();
         let terms: Map<String, Json> =
             self.terms.iter().map(|(k, c)| (k.clone(), digest(c))).collect();
-        serde_json::json!({
+        let mut identity = serde_json::json!({
             "env": self.env.id,
             "kwargs": self.config.kwargs,
             "attributes": self.config.attributes,
@@ -238,7 +247,13 @@ impl Variant {
             "terms": terms,
             "agent_functions": functions,
             "allowed": self.allowed.as_ref().map(digest),
-        })
+        });
+        // Elsewhere threshold and window only measure.
+        if let Some(threshold) = self.stops_at() {
+            identity["stop_when_solved"] =
+                serde_json::json!({ "threshold": threshold, "window": self.window });
+        }
+        identity
     }
 }
 

@@ -128,6 +128,8 @@ impl Resolver<'_> {
         let shaped = self.shaping(&draft.shaping, &agent.value, &discretiser, warnings)?;
         let allowed = self.allowed(draft, &any, spec)?;
         use_of_model(draft, &agent, spec, &any, &discretiser)?;
+        let threshold = draft.threshold.or(spec.reward_threshold);
+        let stop_when_solved = stop_when_solved(draft, &agent.value, spec, threshold)?;
         let mut agent_functions = BTreeMap::new();
         if let Some(drafted) = &draft.agent {
             for (name, f) in &drafted.value.functions {
@@ -155,8 +157,9 @@ impl Resolver<'_> {
             episodes,
             seeds: SeedList(draft.seeds.clone().unwrap_or_else(|| (0..SEEDS).collect())),
             max_steps: draft.max_steps.or(spec.max_steps).filter(|&n| n > 0),
-            threshold: draft.threshold.or(spec.reward_threshold),
+            threshold,
             window: draft.window.unwrap_or(WINDOW),
+            stop_when_solved,
             potential: shaped.potential,
             potential_on: shaped.potential_on,
             shaping: shaped.shaping,
@@ -288,6 +291,41 @@ impl Resolver<'_> {
             },
         }
     }
+}
+
+/// Whether training stops when the task is solved. Refused where nothing says when that is, and
+/// to agents that do not learn to act.
+fn stop_when_solved(
+    draft: &ExperimentDraft,
+    agent: &AgentConfig,
+    spec: &EnvSpec,
+    threshold: Option<f64>,
+) -> Result<bool, Diagnostic> {
+    let Some(stop) = draft.stop_when_solved.as_ref().filter(|stop| stop.value) else {
+        return Ok(false);
+    };
+    let name = agent.spec.name;
+    let refuse = |message: String, hint: &str| {
+        Err(Diagnostic::error(message).at(stop.spot.place()).hint(hint))
+    };
+    if agent.is_planner() || agent.is_predictor() {
+        let why = if agent.is_planner() {
+            "has solved its model before the first episode"
+        } else {
+            "plays the policy that it is given, which gets no better"
+        };
+        return refuse(
+            format!("`stop_when_solved` is for learners: `{name}` {why}"),
+            "leave it out, or say `stop_when_solved: false`",
+        );
+    }
+    if threshold.is_none() {
+        return refuse(
+            format!("`stop_when_solved` needs a `threshold`: none is registered for {}", spec.id),
+            "say which mean return counts as solved, for example `threshold: -20.0`",
+        );
+    }
+    Ok(true)
 }
 
 /// Refuses parameters of learners that need a finite model where there is none to use.

@@ -31,21 +31,40 @@ pub fn rolling_mean_at(returns: &[f64], window: usize, played: usize) -> f64 {
     mean(&returns[played.saturating_sub(window)..played])
 }
 
-/// The area under the learning curve per episode: the mean return over all episodes. Higher means
+/// The area under the learning curve per episode: the mean return over `episodes`. Higher means
 /// sooner or better. NaN without episodes.
-pub fn auc(returns: &[f64]) -> f64 {
-    mean(returns)
-}
-
-/// After how many episodes (1-based, hence at least `window`) the mean of the last `window`
-/// returns first reached `threshold`; `None` if never. Only full windows count: a lucky first
-/// episode solves nothing.
+///
+/// A run that stopped before is carried forward: episodes that it did not play count as much as its
+/// last rolling mean over `window`, so that runs of unequal length can be compared.
 ///
 /// # Panics
-/// If `window` is 0.
+/// If `window` is 0 and the run stopped before.
+pub fn auc(returns: &[f64], window: usize, episodes: usize) -> f64 {
+    let played = returns.len();
+    if played == 0 || played >= episodes {
+        return mean(returns);
+    }
+    let carried = (episodes - played) as f64 * rolling_mean_at(returns, window, played);
+    (returns.iter().sum::<f64>() + carried) / episodes as f64
+}
+
+/// Whether a task with these returns so far is solved now: whether the mean of the last `window` of
+/// them is at least `threshold`. Only full windows count: a lucky first episode solves nothing.
+///
+/// # Panics
+/// If `window` is 0 and there are returns.
+pub fn is_solved(returns: &[f64], window: usize, threshold: f64) -> bool {
+    let played = returns.len();
+    played >= window.max(1) && rolling_mean_at(returns, window, played) >= threshold
+}
+
+/// After how many episodes (1-based, hence at least `window`) a task was first solved, as
+/// [`is_solved`] has it; `None` if never.
+///
+/// # Panics
+/// If `window` is 0 and there are returns.
 pub fn first_solved(returns: &[f64], window: usize, threshold: f64) -> Option<usize> {
-    (window.max(1)..=returns.len())
-        .find(|&played| rolling_mean_at(returns, window, played) >= threshold)
+    (window.max(1)..=returns.len()).find(|&played| is_solved(&returns[..played], window, threshold))
 }
 
 /// How many resamples a band draws: half of a single interval's, being read by eye.
@@ -67,22 +86,27 @@ pub struct CurveBand {
     pub high: Vec<f64>,
     /// How many seeds went in. Below two there is no band to draw.
     pub seeds: usize,
+    /// How many of them stopped before the last episode and are carried forward.
+    pub carried: usize,
     /// How the band was made; `None` below two seeds.
     pub method: Option<Method>,
 }
 
 /// The rolling mean over `window` episodes of `returns` (`[seeds][episodes]`) across seeds, with a
-/// pointwise 95 % interval of the IQM.
+/// pointwise 95 % interval of the IQM, up to `episodes`.
 ///
 /// At most 400 evenly spaced episodes, the first and the last among them. The band is made by
 /// [`Method::recommended`]: percentiles of the bootstrap, and the trimmed t below 5 seeds.
-/// Runs of unequal length are compared up to the shortest. Deterministic.
+/// A run that stopped before is carried forward: it keeps its last rolling mean. Without it the rest
+/// of the curve would speak of the seeds that learn slowest. No points if a run has no episodes.
+/// Deterministic.
 ///
 /// # Panics
 /// If `window` is 0.
-pub fn curve_band(returns: &[Vec<f64>], window: usize) -> CurveBand {
+pub fn curve_band(returns: &[Vec<f64>], window: usize, episodes: usize) -> CurveBand {
     let seeds = returns.len();
-    let episodes = returns.iter().map(Vec::len).min().unwrap_or(0);
+    let shortest = returns.iter().map(Vec::len).min().unwrap_or(0);
+    let episodes = if shortest == 0 { 0 } else { episodes };
     let method = Method::recommended(Estimator::Iqm, seeds);
     let episode = spread(episodes, MAX_POINTS);
     let points = episode.len();
@@ -93,13 +117,14 @@ pub fn curve_band(returns: &[Vec<f64>], window: usize) -> CurveBand {
         low: Vec::with_capacity(points),
         high: Vec::with_capacity(points),
         seeds,
+        carried: returns.iter().filter(|run| run.len() < episodes).count(),
         method: (seeds > 1).then_some(method),
     };
     // The same resamples at every point: whole runs are drawn, not single episodes.
     let resamples = Resamples::draw(seeds.max(1), RESAMPLES);
     for &played in &band.episode {
-        let values: Vec<f64> =
-            returns.iter().map(|run| rolling_mean_at(run, window, played)).collect();
+        let at = |run: &Vec<f64>| rolling_mean_at(run, window, played.min(run.len()));
+        let values: Vec<f64> = returns.iter().map(at).collect();
         let centre = iqm(&values);
         let limits = interval_on(&values, Estimator::Iqm, method, LEVEL, &resamples);
         band.mean.push(mean(&values));
@@ -149,11 +174,20 @@ mod tests {
         assert_eq!(first_solved(&x, 6, 0.0), None);
         // Never of NaN.
         assert_eq!(first_solved(&[f64::NAN; 5], 1, 0.0), None);
+        // Now, not once.
+        assert!(is_solved(&x[..2], 2, 15.0) && !is_solved(&x[..4], 2, 15.1));
+        assert!(!is_solved(&x[..1], 2, 15.0) && !is_solved(&[], 1, 0.0));
     }
 
     #[test]
-    fn area_is_per_episode() {
-        assert_eq!(auc(&[0.0, 0.0, 3.0, 3.0]), 1.5);
+    fn area_is_per_episode_and_carries_short_runs_forward() {
+        assert_eq!(auc(&[0.0, 0.0, 3.0, 3.0], 2, 4), 1.5);
+        // The same run stopped after the third episode, when its rolling mean was 1.5; a window
+        // longer than the run is the run.
+        assert_eq!(auc(&[0.0, 0.0, 3.0], 2, 4), (3.0 + 1.5) / 4.0);
+        assert_eq!(auc(&[0.0, 0.0, 3.0], 2, 9), (3.0 + 6.0 * 1.5) / 9.0);
+        assert_eq!(auc(&[0.0, 0.0, 3.0], 20, 9), 1.0);
+        assert!(auc(&[], 2, 9).is_nan());
     }
 
     #[test]
@@ -171,7 +205,7 @@ mod tests {
         // At episode 2 with a window of 2: rolling means 1, 2, 4, 101. The IQM keeps 2 and 4.
         let returns: Vec<Vec<f64>> =
             [1.0, 2.0, 4.0, 101.0].iter().map(|&m| vec![m - 1.0, m + 1.0]).collect();
-        let band = curve_band(&returns, 2);
+        let band = curve_band(&returns, 2, 2);
         assert_eq!(band.episode, [1, 2]);
         assert_eq!((band.mean[1], band.iqm[1]), (27.0, 3.0));
         // The trimmed t: winsorised 2, 2, 4, 4, SSD = 4, se = √(4 / 2), t(0.975; 1) = 12.70620….
@@ -180,12 +214,25 @@ mod tests {
     }
 
     #[test]
-    fn one_seed_has_no_band_and_short_runs_bound_the_curve() {
-        let band = curve_band(&[vec![1.0, 2.0]], 1);
+    fn one_seed_has_no_band() {
+        let band = curve_band(&[vec![1.0, 2.0]], 1, 2);
         assert_eq!((band.low, band.high), (band.iqm.clone(), band.iqm));
-        assert_eq!((band.seeds, band.method), (1, None));
-        assert_eq!(curve_band(&[vec![1.0; 9], vec![1.0; 7]], 1).episode.len(), 7);
-        assert!(curve_band(&[], 20).episode.is_empty());
+        assert_eq!((band.seeds, band.carried, band.method), (1, 0, None));
+        assert!(curve_band(&[], 20, 5).episode.is_empty());
+        assert!(curve_band(&[vec![], vec![1.0]], 20, 5).episode.is_empty());
+    }
+
+    #[test]
+    fn runs_that_stopped_keep_their_last_rolling_mean() {
+        // The first stops after two episodes with a rolling mean of (2 + 4) / 2.
+        let runs = [vec![2.0, 4.0], vec![0.0, 0.0, 10.0, 10.0]];
+        let band = curve_band(&runs, 2, 4);
+        assert_eq!(band.episode, [1, 2, 3, 4]);
+        assert_eq!(band.mean, [1.0, 1.5, 4.0, 6.5]);
+        assert_eq!((band.seeds, band.carried), (2, 1));
+        // Up to an episode that both reached there is nothing to carry.
+        let both = curve_band(&runs, 2, 2);
+        assert_eq!((both.mean, both.carried), (vec![1.0, 1.5], 0));
     }
 
     #[test]
@@ -193,10 +240,10 @@ mod tests {
         let mut stream = Stream::new(3, "test");
         let returns: Vec<Vec<f64>> =
             (0..20).map(|_| (0..900).map(|_| stream.uniform()).collect()).collect();
-        let band = curve_band(&returns, 20);
+        let band = curve_band(&returns, 20, 900);
         assert_eq!(band.episode.len(), 400);
         assert_eq!(band.method, Some(Method::Percentile));
         assert!((0..400).all(|i| band.low[i] < band.iqm[i] && band.iqm[i] < band.high[i]));
-        assert_eq!(band, curve_band(&returns, 20));
+        assert_eq!(band, curve_band(&returns, 20, 900));
     }
 }

@@ -3,7 +3,8 @@
 //! Pure functions on slices; nothing here knows what an experiment is.
 //!
 //! - [`mean`], [`variance`], [`standard_error`], [`quantile`], [`median`], [`iqm`]: descriptions
-//! - [`rolling_mean`], [`rolling_mean_at`], [`auc`], [`first_solved`]: one learning curve in numbers
+//! - [`rolling_mean`], [`rolling_mean_at`], [`auc`], [`is_solved`], [`first_solved`]: one learning
+//!   curve in numbers
 //! - [`interval`], [`interval_with`]: confidence intervals ([`Interval`], [`Method`]) for the mean
 //!   and the IQM ([`Estimator`])
 //! - [`curve_band`]: learning curves across seeds with a pointwise band ([`CurveBand`])
@@ -21,7 +22,9 @@ pub mod distributions;
 mod interval;
 
 pub(crate) use curve::spread;
-pub use curve::{CurveBand, auc, curve_band, first_solved, rolling_mean, rolling_mean_at};
+pub use curve::{
+    CurveBand, auc, curve_band, first_solved, is_solved, rolling_mean, rolling_mean_at,
+};
 pub use describe::{iqm, mean, median, quantile, standard_error, variance};
 pub use interval::{
     Estimator, Interval, LEVEL, Method, RESAMPLES, few_seeds_warning, interval, interval_with,

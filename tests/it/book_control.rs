@@ -1,7 +1,6 @@
 //! Figures and examples of Sutton & Barto (2018) that concern control, and what is known of Taxi.
 //! Each asserts what the figure is there to show, over enough runs to be sure of it.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use runner::env::{AnyEnv, make};
@@ -10,55 +9,11 @@ use runner::learn::registry::{AGENTS, Setup, TabularAgent};
 use runner::learn::{Agent, AgentConfig, ParamValue, QTable, Schedule, Unit, argmax_tol};
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::streams::Stream;
-use runner::mdp::{Action, Env, FiniteEnv, FiniteMdp, FiniteState, Outcome, Schema, Step};
+use runner::mdp::{Env, FiniteMdp, Outcome};
 use runner::shaping::{NativeReward, NoPotential, StateIndex};
 
 use crate::support::build_of;
-
-/// A task given by its table.
-#[derive(Clone)]
-struct Task(FiniteEnv);
-
-impl Task {
-    fn new(table: &[Vec<Vec<Outcome>>], start: usize) -> Self {
-        let mut initial = vec![0.0; table.len()];
-        initial[start] = 1.0;
-        Self(FiniteEnv::new(Arc::new(FiniteMdp::new(table, initial).unwrap())))
-    }
-}
-
-impl Env for Task {
-    type Obs = FiniteState;
-
-    const INDEXED: bool = true;
-
-    fn n_actions(&self) -> usize {
-        self.0.mdp().n_actions()
-    }
-
-    fn reset(&mut self, rng: &mut NumpyRng) -> FiniteState {
-        self.0.reset(rng)
-    }
-
-    fn step(&mut self, action: Action, rng: &mut NumpyRng) -> Step<FiniteState> {
-        let (obs, outcome) = self.0.step(action, rng);
-        Step { obs, reward: outcome.reward, terminated: outcome.terminated }
-    }
-
-    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
-        Some(self.0.mdp())
-    }
-
-    fn state_index(&self, obs: &FiniteState) -> Option<usize> {
-        Some(obs.index as usize)
-    }
-
-    fn schema(&self) -> Schema {
-        Schema { fields: Vec::new(), facts: Vec::new(), actions: Vec::new(), grid: None }
-    }
-
-    fn fields(&self, _obs: &FiniteState, _out: &mut [f64]) {}
-}
+use crate::task::Task;
 
 fn rate(x: f64) -> ParamValue {
     ParamValue::Schedule(Schedule::constant(x))

@@ -17,70 +17,28 @@ use runner::learn::{
 };
 use runner::mdp::numpy::NumpyRng;
 use runner::mdp::streams::Stream;
-use runner::mdp::{Action, Env, FiniteEnv, FiniteMdp, FiniteState, Outcome, Schema, Step};
+use runner::mdp::{Action, Env, FiniteMdp, Outcome, Schema, Step};
 use runner::shaping::{NativeReward, NoPotential, StateIndex};
 
+use crate::task::Task;
+
 /// States in a row; each step goes left or right with equal probability, and beyond the ends the
-/// episode is over (examples 6.2 and 7.1). It starts in the middle.
-#[derive(Clone)]
-struct RandomWalk(FiniteEnv);
-
-impl RandomWalk {
-    /// `n` states; beyond the left end the reward is `left`, beyond the right one 1.
-    fn new(n: usize, left: f64) -> Self {
-        let to = |s: usize, right: bool| {
-            let terminated = if right { s == n - 1 } else { s == 0 };
-            let next_state = if terminated { s } else { s + usize::from(right) * 2 - 1 } as u32;
-            let reward = f64::from(u8::from(terminated)) * if right { 1.0 } else { left };
-            Outcome { probability: 0.5, next_state, reward, terminated }
-        };
-        let table: Vec<_> = (0..n).map(|s| vec![vec![to(s, false), to(s, true)]]).collect();
-        let mut initial = vec![0.0; n];
-        initial[n / 2] = 1.0;
-        Self(FiniteEnv::new(Arc::new(FiniteMdp::new(&table, initial).unwrap())))
-    }
-
-    fn n_states(&self) -> usize {
-        self.0.mdp().n_states()
-    }
-
-    /// The exact values.
-    fn values(&self) -> Vec<f64> {
-        policy_value(self.0.mdp(), 1.0, Policy::Uniform, Over::Every).unwrap().v
-    }
+/// episode is over (examples 6.2 and 7.1). It starts in the middle. `n` states; beyond the left end
+/// the reward is `left`, beyond the right one 1.
+fn random_walk(n: usize, left: f64) -> Task {
+    let to = |s: usize, right: bool| {
+        let terminated = if right { s == n - 1 } else { s == 0 };
+        let next_state = if terminated { s } else { s + usize::from(right) * 2 - 1 } as u32;
+        let reward = f64::from(u8::from(terminated)) * if right { 1.0 } else { left };
+        Outcome { probability: 0.5, next_state, reward, terminated }
+    };
+    let table: Vec<_> = (0..n).map(|s| vec![vec![to(s, false), to(s, true)]]).collect();
+    Task::new(&table, n / 2)
 }
 
-impl Env for RandomWalk {
-    type Obs = FiniteState;
-
-    const INDEXED: bool = true;
-
-    fn n_actions(&self) -> usize {
-        1
-    }
-
-    fn reset(&mut self, rng: &mut NumpyRng) -> FiniteState {
-        self.0.reset(rng)
-    }
-
-    fn step(&mut self, action: Action, rng: &mut NumpyRng) -> Step<FiniteState> {
-        let (obs, outcome) = self.0.step(action, rng);
-        Step { obs, reward: outcome.reward, terminated: outcome.terminated }
-    }
-
-    fn finite(&self) -> Option<&Arc<FiniteMdp>> {
-        Some(self.0.mdp())
-    }
-
-    fn state_index(&self, obs: &FiniteState) -> Option<usize> {
-        Some(obs.index as usize)
-    }
-
-    fn schema(&self) -> Schema {
-        Schema { fields: Vec::new(), facts: Vec::new(), actions: Vec::new(), grid: None }
-    }
-
-    fn fields(&self, _obs: &FiniteState, _out: &mut [f64]) {}
+/// The exact values of a walk.
+fn values(walk: &Task) -> Vec<f64> {
+    policy_value(walk.mdp(), 1.0, Policy::Uniform, Over::Every).unwrap().v
 }
 
 /// Plays within `limits`; `each` sees the agent after every episode.
@@ -105,13 +63,13 @@ fn constant(alpha: f64) -> AlphaSource {
 /// The root mean square over the states of the walk and over `runs` of what `rule` learns, after
 /// each episode: first within a run, then averaged over the runs as the figures do.
 fn errors<R: Rule>(
-    walk: &RandomWalk,
+    walk: &Task,
     (initial, alpha): (f64, f64),
     (runs, episodes): (u64, u32),
     rule: impl Fn() -> R,
 ) -> Vec<f64> {
-    let n = walk.n_states();
-    let exact = walk.values();
+    let n = walk.mdp().n_states();
+    let exact = values(walk);
     let mut means = vec![0.0; episodes as usize];
     for run in 0..runs {
         let estimate = Estimate::new(vec![initial; n], 1.0, constant(alpha));
@@ -134,17 +92,17 @@ fn mean(values: &[f64]) -> f64 {
 
 #[test]
 fn the_walks_have_the_books_values() {
-    let five = RandomWalk::new(5, 0.0);
-    let v = five.values();
+    let five = random_walk(5, 0.0);
+    let v = values(&five);
     assert!(v.iter().zip(1..).all(|(v, i)| (v - f64::from(i) / 6.0).abs() < 1e-12), "{v:?}");
-    let nineteen = RandomWalk::new(19, -1.0);
-    let v = nineteen.values();
+    let nineteen = random_walk(19, -1.0);
+    let v = values(&nineteen);
     assert!(v.iter().zip(-9..).all(|(v, i)| (v - f64::from(i) / 10.0).abs() < 1e-12), "{v:?}");
 }
 
 #[test]
 fn example_6_2_td_beats_constant_alpha_monte_carlo() {
-    let walk = RandomWalk::new(5, 0.0);
+    let walk = random_walk(5, 0.0);
     let size = (100, 100);
     let monte_carlo = || MonteCarloPrediction::new(Visits::Every, 5);
     let td = [0.05, 0.1, 0.15].map(|alpha| errors(&walk, (0.5, alpha), size, Td0::default));
@@ -163,14 +121,14 @@ fn example_6_2_td_beats_constant_alpha_monte_carlo() {
 }
 
 /// The smallest of the errors at these step sizes, averaged over the first ten episodes.
-fn best<R: Rule>(walk: &RandomWalk, alphas: &[f64], rule: impl Fn() -> R) -> f64 {
+fn best<R: Rule>(walk: &Task, alphas: &[f64], rule: impl Fn() -> R) -> f64 {
     let at = |&alpha: &f64| mean(&errors(walk, (0.0, alpha), (100, 10), &rule));
     alphas.iter().map(at).fold(f64::INFINITY, f64::min)
 }
 
 #[test]
 fn figure_7_2_an_intermediate_n_is_best() {
-    let walk = RandomWalk::new(19, -1.0);
+    let walk = random_walk(19, -1.0);
     let alphas: Vec<f64> = (1..=10).map(|i| f64::from(i) / 10.0).collect();
     let errors = [1, 2, 4, 8, 16, 32, 64, 128].map(|n| best(&walk, &alphas, || NStepTd::new(n)));
     // It falls up to n = 4 and rises from there on.
@@ -184,7 +142,7 @@ fn figure_7_2_an_intermediate_n_is_best() {
 
 #[test]
 fn figure_12_6_an_intermediate_lambda_is_best() {
-    let walk = RandomWalk::new(19, -1.0);
+    let walk = random_walk(19, -1.0);
     let alphas: Vec<f64> = [1, 2, 5]
         .map(|i| f64::from(i) / 100.0)
         .into_iter()

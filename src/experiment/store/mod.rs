@@ -83,7 +83,7 @@ impl StoredUnit {
     /// The values (or the weights), if the agent of `variant`, whose unit this is, keeps any.
     pub fn learned(&self, variant: &Variant) -> Option<Learned> {
         let (n_states, n_actions) = self.shape;
-        let initial = initial_value(variant);
+        let (initial, episodes) = (initial_value(variant), self.rows.len() as u32);
         if n_states == 0 {
             return None;
         }
@@ -93,7 +93,7 @@ impl StoredUnit {
                 experienced[*feature] = !initial.holds(*feature, row);
             }
             let weights = initial.filled(&self.q).weights().clone();
-            return Some(Learned { values: Values::Q(weights), experienced });
+            return Some(Learned { values: Values::Q(weights), experienced, episodes });
         }
         if n_actions == 0 {
             let mut v = vec![initial.unwrap_or(0.0); n_states];
@@ -102,7 +102,7 @@ impl StoredUnit {
                 v[s] = value;
                 experienced[s] = !is_initial(&[value], initial);
             }
-            return Some(Learned { values: Values::V(v), experienced });
+            return Some(Learned { values: Values::V(v), experienced, episodes });
         }
         let mut q = QTable::new(n_states, n_actions, initial.unwrap_or(0.0));
         let mut experienced = vec![false; n_states];
@@ -112,7 +112,7 @@ impl StoredUnit {
             }
             experienced[*s] = !is_initial(values, initial);
         }
-        Some(Learned { values: Values::Q(q), experienced })
+        Some(Learned { values: Values::Q(q), experienced, episodes })
     }
 }
 
