@@ -32,7 +32,7 @@ pub struct EpisodeRow {
 }
 
 /// Everything one unit produced.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct UnitRecord {
     /// Its episodes, in order.
     pub rows: Vec<EpisodeRow>,
