@@ -32,7 +32,7 @@ pub struct EpisodeRow {
 }
 
 /// Everything one unit produced.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct UnitRecord {
     /// Its episodes, in order.
     pub rows: Vec<EpisodeRow>,
