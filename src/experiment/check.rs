@@ -35,8 +35,8 @@ pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
         };
         let seed = probe.seeds.0[0];
         match run_unit(&host, &probe, seed, &AtomicBool::new(false), &mut |_| {}) {
-            Ok(_) | Err(UnitError::Interrupted) => {}
-            Err(UnitError::Script(d)) => return Err(*d),
+            Ok(_) | Err(UnitError::Interrupted | UnitError::Store(_)) => {}
+            Err(UnitError::Script(d) | UnitError::Diverged(d, _)) => return Err(*d),
         }
     }
     Ok(host.printed())

@@ -5,8 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
+use super::interrupted::Resumable;
 use super::store::{Store, StoreError};
-use super::unit::{Unit, UnitError, run_unit, units};
+use super::unit::{Unit, UnitError, resume_unit, units};
 use crate::script::{Diagnostic, Host, Plan};
 
 /// How a run is going; read by whoever shows it.
@@ -154,18 +155,27 @@ fn one(
 ) -> Result<Finished, Option<ExecuteError>> {
     let variant = &plan.variants[unit.variant];
     let start = Instant::now();
+    let mut made = 0;
     let mut each = |steps: u32| {
+        made += u64::from(steps);
         progress.episodes.fetch_add(1, Ordering::Relaxed);
         progress.steps.fetch_add(u64::from(steps), Ordering::Relaxed);
     };
-    let record = match run_unit(host, variant, unit.seed, &progress.stop, &mut each) {
+    let at = Some(Resumable { store, unit });
+    let record = match resume_unit(host, variant, unit.seed, at, &progress.stop, &mut each) {
         Ok(record) => record,
         Err(UnitError::Interrupted) => return Err(None),
         Err(UnitError::Script(d)) => return Err(Some(ExecuteError::Script(d))),
+        Err(UnitError::Store(e)) => return Err(Some(e.into())),
+        Err(UnitError::Diverged(d, record)) => {
+            let kept = store.put_failed(unit, variant, &record).map_err(|e| Some(e.into()))?;
+            let note = format!("its logs are in {}", kept.display());
+            return Err(Some(ExecuteError::Script(Box::new(d.note(note)))));
+        }
     };
     let seconds = start.elapsed().as_secs_f64();
     let unplayed = u64::from(variant.episodes) - record.rows.len() as u64;
     progress.episodes.fetch_add(unplayed, Ordering::Relaxed);
     store.commit(unit, variant, &record).map_err(|e| Some(e.into()))?;
-    Ok(Finished { unit: unit.clone(), steps: record.steps(), seconds })
+    Ok(Finished { unit: unit.clone(), steps: made, seconds })
 }

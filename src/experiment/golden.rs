@@ -67,8 +67,10 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
     for (i, &seed) in variant.seeds.0.iter().enumerate() {
         let record = match run_unit(host, variant, seed, &AtomicBool::new(false), &mut |_| {}) {
             Ok(record) => record,
-            Err(UnitError::Script(d)) => return Err(*d),
-            Err(UnitError::Interrupted) => unreachable!("nothing raises the flag"),
+            Err(UnitError::Script(d) | UnitError::Diverged(d, _)) => return Err(*d),
+            Err(UnitError::Interrupted | UnitError::Store(_)) => {
+                unreachable!("nothing raises the flag, nothing is written")
+            }
         };
         writeln!(out, "  seed {seed}").expect(MEMORY);
         returns(variant, &record, out);

@@ -15,6 +15,7 @@ mod check;
 mod endless;
 mod execute;
 pub mod golden;
+mod interrupted;
 mod landscape;
 pub mod play;
 mod predict;
@@ -42,6 +43,7 @@ pub use audit::{
 };
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
+pub use interrupted::Resumable;
 pub use landscape::{Landscape, ListedState};
 pub use predict::has_exact_values;
 pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
@@ -51,4 +53,4 @@ pub use store::{
     read_table, read_weights, write_atomically, write_atomically_with,
 };
 pub use train::{Limits, Solved, TrainError, World, train};
-pub use unit::{SEMANTICS, Unit, UnitError, run_unit, units};
+pub use unit::{SEMANTICS, Unit, UnitError, resume_unit, run_unit, units};

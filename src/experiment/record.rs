@@ -32,7 +32,7 @@ pub struct EpisodeRow {
 }
 
 /// Everything one unit produced.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct UnitRecord {
     /// Its episodes, in order.
     pub rows: Vec<EpisodeRow>,
@@ -52,7 +52,7 @@ pub struct UnitRecord {
 }
 
 /// A network that is kept.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TrainedNetwork {
     /// As what.
     pub which: Checkpoint,

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::record::EpisodeRow;
 use super::starts::Starts;
+use crate::learn::dqn::Dqn;
 use crate::learn::{Last, Learn, Seen};
 use crate::mdp::numpy::NumpyRng;
 use crate::mdp::{Action, Ending, Env, Step};
@@ -84,6 +85,13 @@ pub enum TrainError {
         /// Episode.
         episode: u32,
     },
+    /// The loss of a network stopped being finite.
+    Diverged {
+        /// In this episode, from 0.
+        episode: u32,
+        /// At this step of the run, from 1.
+        step: u64,
+    },
     /// The run was asked to stop.
     Interrupted,
 }
@@ -101,7 +109,7 @@ const STOP_INTERVAL: u32 = 1 << 16;
 /// ([`Agent::shaping`](crate::learn::Agent::shaping)) is counted with it.
 ///
 /// # Errors
-/// If a callback fails, returns stop being finite, or `stop` is raised.
+/// If a callback fails, returns or a network's loss stop being finite, or `stop` is raised.
 pub fn train<E, D, P, R, A>(
     world: &mut World<E, D, P, R>,
     agent: &mut A,
@@ -117,9 +125,34 @@ where
     R: RewardModel<E>,
     A: Learn<D::State>,
 {
+    go_on(world, agent, limits, &[], rng, stop, |row, agent, _| each(row, agent))
+}
+
+/// Goes on with what [`train`] has begun, `past` being the native returns of the episodes that were
+/// played by then: agent and generator are as they were after the last of them. `each` sees the
+/// generator as well.
+///
+/// # Errors
+/// As [`train`].
+pub(super) fn go_on<E, D, P, R, A>(
+    world: &mut World<E, D, P, R>,
+    agent: &mut A,
+    limits: Limits,
+    past: &[f64],
+    rng: &mut NumpyRng,
+    stop: &AtomicBool,
+    mut each: impl FnMut(EpisodeRow, &A, &NumpyRng),
+) -> Result<(), TrainError>
+where
+    E: Env,
+    D: Discretiser<E>,
+    P: Potential<E>,
+    R: RewardModel<E>,
+    A: Learn<D::State>,
+{
     let mut starts = limits.exploring_starts.and_then(|seed| Starts::new(&world.env, seed));
-    let mut returns = Vec::new();
-    for episode in 0..limits.episodes {
+    let mut returns = past.to_vec();
+    for episode in past.len() as u32..limits.episodes {
         if stop.load(Ordering::Relaxed) {
             return Err(TrainError::Interrupted);
         }
@@ -128,7 +161,10 @@ where
             Ok(row) if !row.learned.is_finite() => return Err(TrainError::NotFinite { episode }),
             Ok(row) => {
                 let native = row.native;
-                each(row, agent);
+                each(row, agent, rng);
+                if let Some(step) = agent.dqn().and_then(Dqn::failed_at) {
+                    return Err(TrainError::Diverged { episode, step });
+                }
                 if let Some(Solved { threshold, window }) = limits.stop_when {
                     returns.push(native);
                     if is_solved(&returns, window, threshold) {

@@ -5,17 +5,17 @@ use std::sync::atomic::AtomicBool;
 use sha2::{Digest, Sha256};
 
 use super::assemble::Assembled;
+use super::interrupted::{Resumable, SoFar};
 use super::predict::Exact;
-use super::record::{EpisodeRow, StateValues, TrainedNetwork, UnitRecord};
-use super::store::Checkpoint;
-use super::train::{Limits, Solved, TrainError, World, train};
+use super::record::{StateValues, UnitRecord};
+use super::store::StoreError;
+use super::train::{Limits, Solved, TrainError, World, go_on};
 use super::{assemble, hex, shaped};
 use crate::env::EnvVisitor;
 use crate::learn::planning::Sweep;
 use crate::learn::registry::{AgentVisitor, TabularAgent};
 use crate::learn::{AnyAgent, Learn, QTable};
 use crate::mdp::Env;
-use crate::mdp::numpy::NumpyRng;
 use crate::script::{Diagnostic, DiscretiserSpec, Host, Plan, Variant};
 use crate::shaping::{
     AnyCells, AnyPotential, AnyReward, Bins, Discretiser, Fault, FeatureSpec, Fields, NativeReward,
@@ -65,6 +65,10 @@ pub fn units(plan: &Plan) -> Vec<Unit> {
 pub enum UnitError {
     /// The script's fault: a callback failed.
     Script(Box<Diagnostic>),
+    /// A network's loss stopped being finite: what was written down until then.
+    Diverged(Box<Diagnostic>, Box<UnitRecord>),
+    /// It could not be written down where it stopped.
+    Store(StoreError),
     /// The run was asked to stop.
     Interrupted,
 }
@@ -96,15 +100,26 @@ impl UnitError {
                     .hint("rewards or potentials are too large to be added up");
                 (Fault(Box::new(d)), format!("in episode {}", episode + 1))
             }
+            TrainError::Diverged { episode, step } => {
+                let d = Diagnostic::error("the network diverged: its loss is not finite")
+                    .at(variant.place.clone())
+                    .hint(
+                        "a smaller `learning_rate`, `max_grad_norm`, `loss: \"huber\"` or smaller \
+                         rewards keep it bounded",
+                    );
+                let moment = format!("at step {step} of the run, in episode {}", episode + 1);
+                (Fault(Box::new(d)), moment)
+            }
         };
         match Self::fault(variant, seed, fault) {
             Self::Script(d) => Self::Script(Box::new(d.note(moment))),
-            Self::Interrupted => Self::Interrupted,
+            other => other,
         }
     }
 }
 
-/// Runs `variant` under `seed`; `each` hears the number of steps of every finished episode.
+/// Runs `variant` under `seed`; `each` hears the number of steps of every finished episode; 0 of one that was played before an
+/// interruption.
 ///
 /// The environment is seeded as `env.reset(seed=seed)` would, and goes on unseeded; the agent has
 /// a stream of its own. Variants with the same seed share both (common random numbers).
@@ -118,12 +133,30 @@ pub fn run_unit(
     stop: &AtomicBool,
     each: &mut dyn FnMut(u32),
 ) -> Result<UnitRecord, UnitError> {
+    resume_unit(host, variant, seed, None, stop, each)
+}
+
+/// The same for a unit that may have been interrupted before: a network's training is written down
+/// at `at` when it is interrupted, and from time to time, and goes on from there with the same
+/// results. Other units start anew.
+///
+/// # Errors
+/// If a callback fails, the network diverges, it cannot be written down, or `stop` is raised.
+pub fn resume_unit(
+    host: &Host,
+    variant: &Variant,
+    seed: u64,
+    at: Option<Resumable<'_>>,
+    stop: &AtomicBool,
+    each: &mut dyn FnMut(u32),
+) -> Result<UnitRecord, UnitError> {
     let env = variant.environment().map_err(|e| {
         UnitError::Script(Box::new(Diagnostic::error(e.message).maybe_hint(e.hint)))
     })?;
-    env.visit(RunUnit { host, variant, seed, stop, each }).map_err(|e| match e {
+    env.visit(RunUnit { host, variant, seed, at, stop, each }).map_err(|e| match e {
         UnitError::Script(d) => UnitError::Script(Box::new(host.annotate(*d))),
-        UnitError::Interrupted => UnitError::Interrupted,
+        UnitError::Diverged(d, record) => UnitError::Diverged(Box::new(host.annotate(*d)), record),
+        other => other,
     })
 }
 
@@ -131,6 +164,7 @@ struct RunUnit<'a> {
     host: &'a Host,
     variant: &'a Variant,
     seed: u64,
+    at: Option<Resumable<'a>>,
     stop: &'a AtomicBool,
     each: &'a mut dyn FnMut(u32),
 }
@@ -176,33 +210,35 @@ impl EnvVisitor for RunUnit<'_> {
 }
 
 /// What a variant trains with, apart from its environment and discretiser.
-struct Parts<E: Env> {
+struct Parts<'a, E: Env> {
     potential: AnyPotential,
     reward: AnyReward<E>,
     agent: AnyAgent,
     /// What else the unit leaves behind.
-    extra: Extra,
+    extra: Extra<'a>,
 }
 
 /// What a unit knows about its agent beyond what it learns.
-struct Extra {
+struct Extra<'a> {
     sweeps: Vec<Sweep>,
     exact: Option<Exact>,
+    /// What was done before it was interrupted, if it is a network's.
+    so_far: Option<SoFar<'a>>,
 }
 
-impl RunUnit<'_> {
+impl<'a> RunUnit<'a> {
     fn parts<E: Env + Clone + 'static>(
         &self,
         env: &E,
         n_cells: usize,
-    ) -> Result<Parts<E>, UnitError> {
+    ) -> Result<Parts<'a, E>, UnitError> {
         let (host, variant, seed) = (self.host, self.variant, self.seed);
         let fault = |f| UnitError::fault(variant, seed, f);
         let potential = shaped::potential(host, variant, env, n_cells).map_err(fault)?;
         let reward = assemble::reward(host, variant, env).map_err(fault)?;
         let Assembled { agent, sweeps, exact } =
             assemble::agent(host, variant, env, n_cells, seed).map_err(fault)?;
-        Ok(Parts { potential, reward, agent, extra: Extra { sweeps, exact } })
+        Ok(Parts { potential, reward, agent, extra: Extra { sweeps, exact, so_far: None } })
     }
 
     /// The commonest agents have loops of their own, for plain and potential-only rewards and for
@@ -256,7 +292,7 @@ impl RunUnit<'_> {
         let reward = assemble::reward(host, variant, &env).map_err(fault)?;
         let agent = assemble::linear_agent(variant, features, &env, seed);
         let discretiser = RawFields { n_states: 0, shield };
-        let extra = Extra { sweeps: Vec::new(), exact: None };
+        let extra = Extra { sweeps: Vec::new(), exact: None, so_far: None };
         self.train(World { env, discretiser, potential, reward }, agent, extra)
     }
 
@@ -271,9 +307,11 @@ impl RunUnit<'_> {
         let n_states = env.n_states().unwrap_or(0);
         let potential = shaped::potential(host, variant, &env, n_states.max(1)).map_err(fault)?;
         let reward = assemble::reward(host, variant, &env).map_err(fault)?;
-        let agent: Box<dyn Learn<Fields>> = Box::new(assemble::network_agent(variant, &env, seed));
+        let agent = assemble::network_agent(variant, &env, seed);
         let discretiser = RawFields { n_states, shield };
-        let extra = Extra { sweeps: Vec::new(), exact: None };
+        let (so_far, agent) = SoFar::start(seed, variant.episodes, self.at).resume(agent);
+        let agent: Box<dyn Learn<Fields>> = Box::new(agent);
+        let extra = Extra { sweeps: Vec::new(), exact: None, so_far: Some(so_far) };
         self.train(World { env, discretiser, potential, reward }, agent, extra)
     }
 
@@ -281,7 +319,7 @@ impl RunUnit<'_> {
         self,
         mut world: World<E, D, P, R>,
         mut agent: A,
-        extra: Extra,
+        extra: Extra<'_>,
     ) -> Result<UnitRecord, UnitError>
     where
         E: Env,
@@ -290,7 +328,7 @@ impl RunUnit<'_> {
         R: RewardModel<E>,
         A: Learn<D::State>,
     {
-        let RunUnit { variant, seed, stop, each, .. } = self;
+        let RunUnit { variant, seed, at, stop, each, .. } = self;
         let limits = Limits {
             episodes: variant.episodes,
             max_steps: variant.max_steps,
@@ -302,20 +340,44 @@ impl RunUnit<'_> {
                 .stops_at()
                 .map(|threshold| Solved { threshold, window: variant.window as usize }),
         };
-        let Extra { sweeps, exact } = extra;
+        let Extra { sweeps, exact, so_far } = extra;
         let spacing = exact.as_ref().map_or(0, |exact| exact.spacing(limits.episodes));
-        let mut rng = NumpyRng::from_u64(seed);
-        let mut rows: Vec<EpisodeRow> = Vec::with_capacity(limits.episodes as usize);
-        train(&mut world, &mut agent, limits, &mut rng, stop, |mut row, agent| {
-            each(row.steps);
-            if let (Some(exact), Some(v)) = (&exact, agent.v()) {
-                let episode = rows.len() as u32;
-                let due = episode.is_multiple_of(spacing) || episode + 1 == limits.episodes;
-                row.value_error = due.then(|| exact.error(v));
-            }
-            rows.push(row);
-        })
-        .map_err(|e| UnitError::train(variant, seed, e))?;
+        let mut so_far = so_far.unwrap_or_else(|| SoFar::start(seed, limits.episodes, at));
+        for _ in &so_far.rows {
+            each(0);
+        }
+        let past: Vec<f64> = so_far.rows.iter().map(|row| row.native).collect();
+        let mut rng = so_far.rng.clone();
+        let window = variant.window as usize;
+        let trained =
+            go_on(&mut world, &mut agent, limits, &past, &mut rng, stop, |mut row, agent, rng| {
+                each(row.steps);
+                if let (Some(exact), Some(v)) = (&exact, agent.v()) {
+                    let episode = so_far.rows.len() as u32;
+                    let due = episode.is_multiple_of(spacing) || episode + 1 == limits.episodes;
+                    row.value_error = due.then(|| exact.error(v));
+                }
+                match agent.dqn() {
+                    Some(dqn) => so_far.played(row, window, dqn, rng),
+                    None => so_far.rows.push(row),
+                }
+            });
+        so_far.rng = rng;
+        if let Err(e) = trained {
+            let error = UnitError::train(variant, seed, e);
+            return Err(match (error, agent.dqn()) {
+                (UnitError::Interrupted, Some(dqn)) => match so_far.write(dqn) {
+                    Ok(()) => UnitError::Interrupted,
+                    Err(e) => UnitError::Store(e),
+                },
+                (UnitError::Script(d), Some(dqn)) if dqn.failed_at().is_some() => {
+                    let log = dqn.log().to_vec();
+                    let record = UnitRecord { rows: so_far.rows, log, ..UnitRecord::default() };
+                    UnitError::Diverged(d, Box::new(record))
+                }
+                (error, _) => error,
+            });
+        }
         let weights = agent.weights().cloned();
         let q = agent.q().cloned();
         let learned = [&weights, &q].into_iter().flatten().flat_map(QTable::values);
@@ -326,18 +388,15 @@ impl RunUnit<'_> {
             v: v.to_vec(),
             exact: exact.map_or_else(Vec::new, |exact| exact.v),
         });
-        let (mut networks, mut log) = (Vec::new(), Vec::new());
-        if let Some(dqn) = agent.dqn() {
-            let (which, episode) = (Checkpoint::Last, rows.len() as u32);
-            networks.push(TrainedNetwork { which, episode, net: dqn.network().clone() });
-            log.extend(dqn.log());
-        }
+        let networks = agent.dqn().map_or_else(Vec::new, |dqn| so_far.networks(dqn));
+        let log = agent.dqn().map_or_else(Vec::new, |dqn| dqn.log().to_vec());
+        let rows = so_far.rows;
         Ok(UnitRecord { rows, q, weights, values, sweeps, networks, log })
     }
 }
 
 struct Train<'a, E, D, P, R> {
-    unit: (RunUnit<'a>, Extra),
+    unit: (RunUnit<'a>, Extra<'a>),
     world: World<E, D, P, R>,
 }
 

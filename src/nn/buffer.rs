@@ -42,6 +42,12 @@ impl<T: Real> Clone for Buffer<T> {
     }
 }
 
+impl<T: Real> PartialEq for Buffer<T> {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
 impl<T: Real> Deref for Buffer<T> {
     type Target = [T];
 

@@ -64,7 +64,7 @@ impl Layer {
 /// With dueling heads the last layer gives advantages A and a value V, and the action values are
 /// `Q(s, a) = V + A(a) − mean A` (Wang et al. 2016, equation 9). Deviation: both heads read the last
 /// hidden layer; they have no hidden layers of their own.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Mlp<T: Real> {
     shape: Shape,
     pub(super) layers: Vec<Layer>,

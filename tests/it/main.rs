@@ -10,6 +10,7 @@ mod env;
 mod floors;
 mod frozen_lake;
 mod golden;
+mod interrupted;
 mod language;
 mod linear;
 mod models;

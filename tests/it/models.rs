@@ -67,9 +67,15 @@ fn a_stored_network_plays_from_its_study_and_from_its_file() {
     assert!(
         !stdout(&fenced).contains(r#""action":0"#) && !stdout(&fenced).contains(r#""action":3"#)
     );
-    let best = play(&["--model", "best"]);
-    expect_code(&best, 2);
-    assert!(stderr(&best).contains("best.safetensors: is not there"), "{}", stderr(&best));
+    // The best of CartPole's networks is kept beside the last.
+    let best = unit(&results, "cart").join("best.safetensors").display().to_string();
+    let said = json(&run(&["export", &best, "--json"]));
+    assert_eq!(said["manifest"]["checkpoint"], "best");
+    let played = play(&["--model", "best", "--env-seed", "5"]);
+    expect_code(&played, 0);
+    let by_file = ["rollout", "CartPole-v1", "--seed", "5", "--policy", &best, "--steps"];
+    let steps = (stdout(&played).lines().count() - 1).to_string();
+    assert_eq!(stdout(&run(&[&by_file[..], &[&steps]].concat())), stdout(&played));
 
     let other = dir.path().join("tables");
     std::fs::create_dir(&other).unwrap();

@@ -10,6 +10,7 @@ mod atomic;
 mod format;
 mod learning;
 mod model;
+mod partial;
 mod tensors;
 mod weights;
 
@@ -29,6 +30,7 @@ use super::record::{EpisodeRow, Learned, UnitRecord, Values};
 use super::unit::Unit;
 use crate::learn::QTable;
 use crate::learn::dqn::LogRow;
+use crate::learn::dqn::Snapshot;
 use crate::script::Variant;
 
 pub use atomic::{write_atomically, write_atomically_with};
@@ -197,12 +199,46 @@ impl Store {
     /// If it is there and cannot be removed.
     pub fn remove(&self, unit: &Unit) -> Result<(), StoreError> {
         let folder = self.path(unit);
+        let _ = fs::remove_file(folder.with_extension("partial"));
         match fs::remove_dir_all(&folder) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => {
                 Err(StoreError::io(&folder, "cannot be removed", &e))
             }
             _ => Ok(()),
         }
+    }
+
+    /// What a unit had come to when it was interrupted, if that is there and whole.
+    pub(super) fn partial(&self, unit: &Unit) -> Option<Snapshot> {
+        partial::decode(&unit.hash, &fs::read(self.path(unit).with_extension("partial")).ok()?)
+    }
+
+    /// Keeps what a unit has come to.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(super) fn put_partial(&self, unit: &Unit, snapshot: &Snapshot) -> Result<(), StoreError> {
+        let path = self.path(unit).with_extension("partial");
+        let shelf = self.root.join(&unit.hash[..2]);
+        fs::create_dir_all(&shelf).map_err(|e| StoreError::io(&shelf, "cannot be made", &e))?;
+        write_atomically(&path, &partial::encode(&unit.hash, snapshot))
+    }
+
+    /// Keeps the logs of a unit that failed, for its user to look at. Returns where they are.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub(super) fn put_failed(
+        &self,
+        unit: &Unit,
+        variant: &Variant,
+        record: &UnitRecord,
+    ) -> Result<PathBuf, StoreError> {
+        let folder = self.path(unit).with_extension("failed");
+        fs::create_dir_all(&folder).map_err(|e| StoreError::io(&folder, "cannot be made", &e))?;
+        write_atomically(&folder.join("monitor.csv"), &monitor(variant, record))?;
+        write_atomically(&folder.join("learning.csv"), &learning(&record.log))?;
+        Ok(folder)
     }
 
     /// Stores a unit. If another process has stored it meanwhile, its copy stands.
@@ -283,7 +319,11 @@ impl Store {
             fs::rename(temporary.path(), &folder)
                 .map_err(|e| StoreError::io(&folder, "cannot be put in place", &e))?;
         }
-        sync_folder(&shelf).map_err(|e| StoreError::io(&shelf, "cannot be synced", &e))
+        sync_folder(&shelf).map_err(|e| StoreError::io(&shelf, "cannot be synced", &e))?;
+        // What is left of earlier attempts says nothing any more; it is in nobody's way either.
+        let _ = fs::remove_file(folder.with_extension("partial"));
+        let _ = fs::remove_dir_all(folder.with_extension("failed"));
+        Ok(())
     }
 
     /// The unit's files, checked against `result.json`.

@@ -186,6 +186,11 @@ impl Dqn {
         self.counts.failed
     }
 
+    /// Steps made.
+    pub fn steps(&self) -> u64 {
+        self.counts.steps
+    }
+
     /// Gradient steps made.
     pub fn updates(&self) -> u64 {
         self.counts.updates
