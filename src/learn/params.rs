@@ -138,10 +138,12 @@ pub enum ParamKind {
     Exploration,
     /// One of these words.
     Word(&'static [&'static str]),
-    /// A finite number above 0 and up to `max`, or [`Self::NONE`].
+    /// A finite number from 0 to `max`, or [`Self::NONE`].
     Maybe {
         /// Upper limit.
         max: f64,
+        /// Whether 0 is excluded.
+        open: bool,
     },
     /// The widths of hidden layers.
     Widths,
@@ -166,10 +168,10 @@ impl ParamKind {
                 (true, false) => format!("a number of at least {min}"),
                 _ => "a finite number".into(),
             },
-            Self::Maybe { max } if max.is_finite() => {
-                format!("a number above 0 and at most {max}, or {:?}", Self::NONE)
+            Self::Maybe { max, open } => {
+                let number = Self::Float { min: 0.0, max, open }.allowed();
+                format!("{number}, or {:?}", Self::NONE)
             }
-            Self::Maybe { .. } => format!("a number above 0, or {:?}", Self::NONE),
             Self::Widths => format!(
                 "a list of 1 to {} whole numbers from 1 to {}",
                 Widths::MAX_LAYERS,
@@ -209,7 +211,7 @@ impl ParamKind {
             | (Self::Exploration, ParamValue::Exploration(_))
             | (Self::Bool, ParamValue::Bool(_)) => Some(value),
             (Self::StepSize, _) => Self::Rate { open: true }.accept(value),
-            (Self::Maybe { max }, _) => Self::Float { min: 0.0, max, open: true }.accept(value),
+            (Self::Maybe { max, open }, _) => Self::Float { min: 0.0, max, open }.accept(value),
             (
                 Self::Bool | Self::Word(_) | Self::Int { .. } | Self::Exploration | Self::Widths,
                 _,

@@ -4,7 +4,7 @@ use super::diagnostic::Diagnostic;
 use crate::learn::{AgentConfig, ParamKind, ParamValue, Schedule, Unit};
 
 /// The keys that give ε as a straight line.
-const EXPLORATION: [&str; 3] =
+pub(super) const EXPLORATION: [&str; 3] =
     ["exploration_initial_eps", "exploration_final_eps", "exploration_fraction"];
 
 /// What they are where only some are given: those of Stable-Baselines3.

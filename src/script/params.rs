@@ -5,6 +5,7 @@ use rhai::{Dynamic, FnPtr, Map};
 use super::diagnostic::{Diagnostic, suggest};
 use super::draft::{AgentDraft, Located, Spot, captured_now};
 use super::errors::type_name;
+use super::network;
 use super::value::Value;
 use crate::learn::registry::AgentSpec;
 use crate::learn::{Exploration, ParamKind, ParamValue, Schedule, Widths};
@@ -137,6 +138,16 @@ pub(super) fn merge_agent(
         })?;
         agent.functions.remove(param.name);
         agent.params.insert(param.name, accepted);
+    }
+    if map.contains_key("epsilon") {
+        let line = network::EXPLORATION.into_iter().find(|name| {
+            agent.params.get(name).is_some_and(|x| *x != ParamValue::Word(ParamKind::NONE))
+        });
+        if let Some(name) = line {
+            return Err(Diagnostic::error(format!("`epsilon` plays no part with `{name}`"))
+                .at(spot("epsilon").place())
+                .hint(format!("leave out one of them, or say `{name}: {:?}`", ParamKind::NONE)));
+        }
     }
     match agent.params.get("exploration") {
         Some(ParamValue::Exploration(Exploration::EpsilonGreedy)) | None => Ok(()),

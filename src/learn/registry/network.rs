@@ -16,10 +16,13 @@ const fn switch(name: &'static str, doc: &'static str) -> ParamSpec {
     ParamSpec { name, kind: ParamKind::Bool, function: None, default, doc }
 }
 
-const fn maybe(name: &'static str, max: f64, doc: &'static str) -> ParamSpec {
-    let default = ParamValue::Word(ParamKind::NONE);
-    ParamSpec { name, kind: ParamKind::Maybe { max }, function: None, default, doc }
+const fn maybe(name: &'static str, kind: ParamKind, doc: &'static str) -> ParamSpec {
+    ParamSpec { name, kind, function: None, default: ParamValue::Word(ParamKind::NONE), doc }
 }
+
+const MAYBE_EPSILON: ParamKind = ParamKind::Maybe { max: 1.0, open: false };
+const MAYBE_FRACTION: ParamKind = ParamKind::Maybe { max: 1.0, open: true };
+const MAYBE_LENGTH: ParamKind = ParamKind::Maybe { max: f64::INFINITY, open: true };
 
 const NET_ARCH: Widths = match Widths::new(&[24, 24]) {
     Some(widths) => widths,
@@ -78,7 +81,7 @@ const PARAMS: &[ParamSpec] = &[
         default: ParamValue::Word("mse"),
         doc: "what is minimised: the squared error, or beyond 1 its size",
     },
-    maybe("max_grad_norm", f64::INFINITY, "length to which a longer gradient is shortened"),
+    maybe("max_grad_norm", MAYBE_LENGTH, "length to which a longer gradient is shortened"),
     count("n_steps", 1, "rewards that a target looks ahead"),
     switch("dueling", "action values as a value and advantages (Wang et al. 2016)"),
     switch("replace", "draw minibatches with replacement"),
@@ -104,9 +107,21 @@ const PARAMS: &[ParamSpec] = &[
         default: ParamValue::Float(1e-6),
         doc: "what keeps priorities above 0",
     },
-    maybe("exploration_fraction", 1.0, "part of the episodes over which epsilon falls linearly"),
-    maybe("exploration_initial_eps", 1.0, "where it starts; 1 if only the others are given"),
-    maybe("exploration_final_eps", 1.0, "where it ends; 0.05 if only the others are given"),
+    maybe(
+        "exploration_fraction",
+        MAYBE_FRACTION,
+        "part of the episodes over which epsilon falls linearly",
+    ),
+    maybe(
+        "exploration_initial_eps",
+        MAYBE_EPSILON,
+        "where it starts; 1 if only the others are given",
+    ),
+    maybe(
+        "exploration_final_eps",
+        MAYBE_EPSILON,
+        "where it ends; 0.05 if only the others are given",
+    ),
     count("log_interval", 1000, "steps between two lines of learning.csv"),
 ];
 
