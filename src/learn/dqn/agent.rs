@@ -217,21 +217,21 @@ impl Dqn {
         let [_, sum, discount] = &mut self.start;
         *sum += *discount * reward;
         *discount *= self.config.gamma;
-        if let Some(next) = &next {
-            self.inputs.keep(next, &mut self.next);
+        match &next {
+            Some(next) => self.inputs.keep(next, &mut self.next),
+            // Whatever was there would do, but not be the same after training was interrupted.
+            None => self.next.fill(0.0),
         }
         let arrival = Arrival {
             kept: &self.next,
             allowed: next.map_or(ActionSet::ALL, |next| next.allowed()),
             terminated: next.is_none(),
         };
-        let Self { window, replay, tree, config, .. } = self;
+        let Self { window, replay, tree, .. } = self;
         window.step(&self.s, self.a, reward, arrival, ended, |e| {
             let place = replay.push(e);
-            if let (Some((tree, _)), Some(p)) = (tree.as_mut(), config.priorities) {
-                let largest = tree.largest();
-                debug_assert!(p.alpha >= 0.0);
-                tree.set(place, largest);
+            if let Some((tree, _)) = tree {
+                tree.set(place, tree.largest());
             }
         });
         self.counts.steps += 1;

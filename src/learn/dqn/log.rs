@@ -31,7 +31,7 @@ pub struct LogRow {
 }
 
 /// Sums since the last entry.
-#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Sums {
     /// Of losses, of action values and of errors, and of how many minibatches.
     pub(super) loss: f64,
@@ -45,6 +45,26 @@ pub(super) struct Sums {
 }
 
 impl Sums {
+    /// As numbers; they need not be finite.
+    pub(super) fn numbers(&self) -> [f64; 7] {
+        let (batches, episodes) = (self.batches as f64, self.episodes as f64);
+        let [value, sum] = [self.start_value, self.start_return];
+        [self.loss, self.q, self.td_error, batches, value, sum, episodes]
+    }
+
+    /// What had these [`Self::numbers`].
+    pub(super) fn of([loss, q, td_error, batches, value, sum, episodes]: [f64; 7]) -> Self {
+        Self {
+            loss,
+            q,
+            td_error,
+            batches: batches as u64,
+            start_value: value,
+            start_return: sum,
+            episodes: episodes as u64,
+        }
+    }
+
     /// The means, and starts anew: loss, action value, error, value and return of first states.
     pub(super) fn take(&mut self) -> [Option<f64>; 5] {
         let s = std::mem::take(self);

@@ -1,7 +1,7 @@
 //! Going on as if training had never stopped.
 
 use super::agent::{Counts, Dqn};
-use super::log::LogRow;
+use super::log::{LogRow, Sums};
 use super::snapshot::Snapshot;
 
 /// Numbers in an entry of the log.
@@ -27,7 +27,7 @@ impl Dqn {
         to.put("behaviour", &self.behaviour.state());
         to.put("learning_rate", &self.learning_rate.state());
         to.put("counts", &self.counts);
-        to.put("sums", &self.sums);
+        to.doubles.insert("sums".into(), self.sums.numbers().to_vec());
         if let Some((tree, beta)) = &self.tree {
             let (priorities, largest) = tree.state(self.replay.len());
             to.doubles.insert("priorities".into(), priorities.to_vec());
@@ -54,7 +54,7 @@ impl Dqn {
         self.behaviour.restore(from.get("behaviour")?);
         self.learning_rate.restore(from.get("learning_rate")?);
         self.counts = from.get::<Counts>("counts")?;
-        self.sums = from.get("sums")?;
+        self.sums = Sums::of(from.doubles.get("sums")?.as_slice().try_into().ok()?);
         if let Some((tree, beta)) = &mut self.tree {
             let priorities = from.doubles.get("priorities")?;
             if priorities.len() != self.replay.len() {
