@@ -16,6 +16,8 @@ mod replay;
 mod resume;
 mod snapshot;
 mod sum_tree;
+#[cfg(test)]
+mod tests;
 mod update;
 
 pub use agent::{Dqn, NetworkSetup};
