@@ -6,6 +6,7 @@ mod book_control;
 mod book_figures;
 mod cli;
 mod crash;
+mod dqn;
 mod env;
 mod floors;
 mod frozen_lake;
