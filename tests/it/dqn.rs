@@ -64,7 +64,11 @@ study("chain", [
         for (s, wanted) in wanted.iter().enumerate() {
             for (a, wanted) in wanted.iter().enumerate() {
                 let error = (q[s][a] - wanted).abs();
-                assert!(error < 0.002, "variant {variant}: Q({s}, {a}) = {}, not {wanted}", q[s][a]);
+                assert!(
+                    error < 0.002,
+                    "variant {variant}: Q({s}, {a}) = {}, not {wanted}",
+                    q[s][a]
+                );
             }
         }
     }

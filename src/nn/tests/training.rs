@@ -47,7 +47,7 @@ fn trained_plainly<T: Real>(shape: &Shape, loss: Loss, rows: usize) -> [Vec<T>; 
         let norm = reference::sum_of_squares(&g).sqrt();
         let factor = T::of(MAX_NORM) / (norm + T::of(1e-6));
         if factor < T::of(1.0) {
-            g.iter_mut().for_each(|g| *g = *g * factor);
+            g = g.into_iter().map(|g| g * factor).collect();
         }
         powers = [powers[0] * 0.9, powers[1] * 0.999];
         let step = AdamStep {

@@ -148,7 +148,7 @@ fn refused_actions_are_never_played() {
     for epsilon in [0.0, 0.5, 1.0] {
         for learning_starts in [0, 200] {
             let epsilon = Schedule::constant(epsilon);
-            let config = DqnConfig { epsilon, learning_starts, ..config() };
+            let config = DqnConfig { learning_starts, epsilon, ..config() };
             let mut agent = Dqn::new(config, setup(true, 2));
             let mut world = Chance::new(true);
             let mut counts = [0u32; N_ACTIONS];

@@ -62,7 +62,9 @@ fn each_transition_is_as_likely_as_any_other() {
                 replay.draw(&mut stream, &mut places);
             }
             firsts[places[0]] += 1;
-            places.iter().for_each(|place| counts[*place] += 1);
+            for place in places {
+                counts[place] += 1;
+            }
             let mut sorted = places;
             sorted.sort_unstable();
             repeated += u32::from(sorted.windows(2).any(|pair| pair[0] == pair[1]));

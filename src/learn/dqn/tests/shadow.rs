@@ -93,21 +93,21 @@ impl Shadow {
         let begun = self.episode.len();
         // What began n steps ago is complete; at the end everything is.
         let first = begun.saturating_sub(n);
-        let complete = match step.ended {
-            true => first..begun,
-            false => first..first + usize::from(begun >= n),
-        };
+        let complete =
+            if step.ended { first..begun } else { first..first + usize::from(begun >= n) };
         for i in complete {
             let kept = self.transition(i);
             self.kept.push(kept);
         }
         self.steps += 1;
         let c = self.config.clone();
-        if self.steps % c.target_update_interval == 0 {
+        if self.steps.is_multiple_of(c.target_update_interval) {
             blend(Kernels::detect(), c.tau, &self.q, &mut self.target);
         }
         let held = self.kept.len().min(c.buffer_size);
-        if held >= c.batch_size && self.steps > c.learning_starts && self.steps % c.train_freq == 0
+        if held >= c.batch_size
+            && self.steps > c.learning_starts
+            && self.steps.is_multiple_of(c.train_freq)
         {
             for _ in 0..c.gradient_steps {
                 self.train();
@@ -161,7 +161,9 @@ impl Shadow {
             drawn.push((self.at(place), pow(held as f64 * probability, -beta)));
         }
         let most = drawn.iter().fold(0.0f64, |m, (_, w)| m.max(*w));
-        drawn.iter_mut().for_each(|(_, w)| *w /= most);
+        for (_, weight) in &mut drawn {
+            *weight /= most;
+        }
         drawn
     }
 
