@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::record::{EpisodeRow, TrainedNetwork};
+use super::record::{EpisodeRow, StartValue, TrainedNetwork};
 use super::store::{Checkpoint, Store, StoreError};
 use super::unit::Unit;
 use crate::learn::dqn::{Dqn, Snapshot};
@@ -16,7 +16,7 @@ use crate::stats::mean;
 const INTERVAL: Duration = Duration::from_secs(30);
 
 /// Numbers of an episode besides its terms.
-const NUMBERS: usize = 6;
+const NUMBERS: usize = 8;
 
 /// Where a unit is written down while it is under way.
 #[derive(Debug, Clone, Copy)]
@@ -146,13 +146,15 @@ fn numbers(row: &EpisodeRow) -> Vec<f64> {
     let ending = f64::from(u8::from(row.ending == Ending::Truncated));
     let mut numbers =
         vec![f64::from(row.steps), row.native, row.learned, row.shaping, row.epsilon, ending];
+    let start = row.start.expect("a network's episodes begin with a value");
+    numbers.extend([start.believed, start.brought]);
     numbers.extend(&row.terms);
     numbers
 }
 
 /// The episode that [`numbers`] wrote.
 fn episode(numbers: &[f64], n_terms: usize) -> Option<EpisodeRow> {
-    let (&[steps, native, learned, shaping, epsilon, ending], terms) =
+    let (&[steps, native, learned, shaping, epsilon, ending, believed, brought], terms) =
         numbers.split_first_chunk()?;
     let ending = if ending == 0.0 { Ending::Terminated } else { Ending::Truncated };
     (terms.len() == n_terms).then(|| EpisodeRow {
@@ -164,5 +166,6 @@ fn episode(numbers: &[f64], n_terms: usize) -> Option<EpisodeRow> {
         epsilon,
         ending,
         value_error: None,
+        start: Some(StartValue { believed, brought }),
     })
 }

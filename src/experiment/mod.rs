@@ -46,7 +46,7 @@ pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use interrupted::Resumable;
 pub use landscape::{Landscape, ListedState};
 pub use predict::has_exact_values;
-pub use record::{EpisodeRow, Learned, StateValues, UnitRecord, Values};
+pub use record::{EpisodeRow, Learned, StartValue, StateValues, UnitRecord, Values};
 pub use score::{Scored, score_variant};
 pub use store::{
     Checkpoint, Model, Store, StoreError, StoredUnit, holds_model, holds_weights, read_model,

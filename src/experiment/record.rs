@@ -29,6 +29,20 @@ pub struct EpisodeRow {
     /// policy reaches. `None` for other agents, without a model, and in between where many episodes
     /// make it costly.
     pub value_error: Option<f64>,
+    /// What a network believed at its start, and what it brought; `None` for other agents.
+    pub start: Option<StartValue>,
+}
+
+/// The first state of an episode, as a network values it and as it turned out. What is believed
+/// beyond what is brought is overestimation (van Hasselt, Guez & Silver 2016), as far as the agent
+/// does not explore.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StartValue {
+    /// The largest action value there, when the episode began.
+    pub believed: f64,
+    /// The discounted learned return of the episode; where the time limit cut it off, what might
+    /// have followed is not in it.
+    pub brought: f64,
 }
 
 /// Everything one unit produced.

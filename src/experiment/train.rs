@@ -296,6 +296,7 @@ where
                     epsilon,
                     ending,
                     value_error: None,
+                    start: None,
                 });
             }
         };

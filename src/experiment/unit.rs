@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 use super::assemble::Assembled;
 use super::interrupted::{Resumable, SoFar};
 use super::predict::Exact;
-use super::record::{StateValues, UnitRecord};
+use super::record::{StartValue, StateValues, UnitRecord};
 use super::store::StoreError;
 use super::train::{Limits, Solved, TrainError, World, go_on};
 use super::{assemble, hex, shaped};
@@ -358,7 +358,11 @@ impl<'a> RunUnit<'a> {
                     row.value_error = due.then(|| exact.error(v));
                 }
                 match agent.dqn() {
-                    Some(dqn) => so_far.played(row, window, dqn, rng),
+                    Some(dqn) => {
+                        let (believed, brought) = dqn.last_start();
+                        row.start = Some(StartValue { believed, brought });
+                        so_far.played(row, window, dqn, rng);
+                    }
                     None => so_far.rows.push(row),
                 }
             });

@@ -130,6 +130,20 @@ impl Kernels {
         levels.into_iter().flatten().map(|level| Self { level }).collect()
     }
 
+    /// What the instruction set is called.
+    pub fn name(self) -> &'static str {
+        #[cfg(target_arch = "x86_64")]
+        if self.level.as_avx512().is_some() {
+            return "AVX-512";
+        } else if self.level.as_avx2().is_some() {
+            return "AVX2";
+        } else {
+            return "SSE2";
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        "NEON"
+    }
+
     /// `y = x w + b` for every row of `y`, shape `[rows, width]`.
     pub(super) fn affine<T: Real>(self, a: &Affine<'_, T>, width: usize, y: &mut [T]) {
         dispatch!(self.level, |simd, WIDE| affine::<_, T, WIDE>(simd, a, width, y));

@@ -34,6 +34,13 @@ pub fn closing_table(plan: &Plan, findings: &Findings) -> StudyTable {
                 .into(),
         );
     }
+    if findings.summaries.iter().any(|s| s.overestimation.is_some()) {
+        notes.push(
+            "overest.: what the network believed of an episode's first state beyond the discounted \
+             learned return that followed, mean over the last episodes; IQM over seeds"
+                .into(),
+        );
+    }
     let stopped: Vec<String> = plan
         .variants
         .iter()

@@ -40,6 +40,8 @@ const ALL_POINTS: usize = 5000;
 pub const NATIVE_RETURN: &str = "native return";
 /// What curves show: the error of a predictor's values.
 pub const VALUE_ERROR: &str = "value error (RMS)";
+/// What curves show: what a network believes the first state to be worth, and what it is.
+pub const START_VALUE: &str = "discounted return from the start";
 
 /// What is drawn.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,8 +64,20 @@ pub struct CurvesPlot {
 pub struct Curve {
     /// The variant's name.
     pub name: String,
+    /// The number of its colour and its marker: the variant's.
+    pub look: usize,
+    /// Whether its line is dashed.
+    pub dashed: bool,
     /// What it reached over episodes, as [`curve_band`](crate::stats::curve_band) makes it.
     pub band: CurveBand,
+}
+
+impl Curve {
+    /// How its line is drawn, as attributes.
+    pub(super) fn stroke(&self) -> String {
+        let dashes = if self.dashed { " stroke-dasharray=\"7 4\"" } else { "" };
+        format!("stroke=\"{}\" stroke-width=\"2.2\"{dashes}", colour(self.look))
+    }
 }
 
 /// The plot as a complete SVG document. Deterministic.
@@ -152,7 +166,7 @@ fn description(plot: &CurvesPlot, subtitle: &str) -> String {
     let quantity = plot.quantity;
     let mut words =
         format!("{}{} over episodes; {subtitle}.", quantity[..1].to_uppercase(), &quantity[1..]);
-    for Curve { name, band } in &plot.curves {
+    for Curve { name, band, .. } in &plot.curves {
         if let (Some(episode), Some(&end)) = (band.episode.last(), band.iqm.last()) {
             let _ = write!(words, " {name}: {} after {episode} episodes", number(end));
             if band.carried > 0 {
@@ -260,28 +274,33 @@ fn panel(svg: &mut String, plot: &CurvesPlot, x: Scale, y: Scale) {
             let _ = writeln!(svg, "<path d=\"{d}\" {style}/>");
         }
     };
-    for (i, Curve { band, .. }) in plot.curves.iter().enumerate() {
+    for Curve { look, band, .. } in &plot.curves {
         if band.method.is_some() {
-            let style = format!("fill=\"{}\" fill-opacity=\"{opacity}\"", colour(i));
+            let style = format!("fill=\"{}\" fill-opacity=\"{opacity}\"", colour(*look));
             path(svg, &area(band, &points(band), x, y), &style);
         }
     }
-    for (i, Curve { band, .. }) in plot.curves.iter().enumerate() {
+    for Curve { look, band, .. } in &plot.curves {
         if band.mean != band.iqm {
             let style =
-                format!("stroke=\"{}\" stroke-width=\"1\" stroke-dasharray=\"4 3\"", colour(i));
+                format!("stroke=\"{}\" stroke-width=\"1\" stroke-dasharray=\"4 3\"", colour(*look));
             path(svg, &line(band, &band.mean, &points(band), x, y), &style);
         }
     }
-    for (i, Curve { band, .. }) in plot.curves.iter().enumerate() {
-        let style = format!("stroke=\"{}\" stroke-width=\"2.2\"", colour(i));
+    for (i, curve) in plot.curves.iter().enumerate() {
+        let (style, band) = (curve.stroke(), &curve.band);
         path(svg, &line(band, &band.iqm, &points(band), x, y), &style);
         if n > 1 || band.episode.len() == 1 {
             // Staggered, so that the markers of coinciding curves stand side by side.
             let places = spread(band.episode.len(), 6 * n);
             let first = i % places.len().max(1);
             for &place in places.iter().skip(first).step_by(n) {
-                marker(svg, i, x.at(band.episode[place - 1] as f64), y.at(band.iqm[place - 1]));
+                marker(
+                    svg,
+                    curve.look,
+                    x.at(band.episode[place - 1] as f64),
+                    y.at(band.iqm[place - 1]),
+                );
             }
         }
     }

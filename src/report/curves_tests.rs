@@ -6,7 +6,11 @@ use crate::stats::curve_band;
 fn plot(threshold: Option<f64>, curves: &[(&str, Vec<Vec<f64>>)]) -> CurvesPlot {
     let curves = curves
         .iter()
-        .map(|(name, runs)| Curve { name: (*name).into(), band: band(runs) })
+        .enumerate()
+        .map(|(look, (name, runs))| {
+            let band = band(runs);
+            Curve { name: (*name).into(), look, dashed: false, band }
+        })
         .collect();
     let (title, quantity) = ("a <study> & more".into(), NATIVE_RETURN);
     CurvesPlot { title, quantity, window: Some(20), threshold, curves }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::curves::{CurvesPlot, colour, marker};
+use super::curves::{CurvesPlot, marker};
 use super::svg::{coordinate, number, text, text_width};
 use super::table::shorten;
 
@@ -61,17 +61,17 @@ impl Legend {
     /// Draws it with its upper left corner at (`left`, `top`).
     pub(super) fn draw(&self, svg: &mut String, plot: &CurvesPlot, left: f64, top: f64) {
         let mut y = top + 8.0;
-        for (i, lines) in self.names.iter().enumerate() {
+        for (curve, lines) in plot.curves.iter().zip(&self.names) {
             let end = coordinate(left + SAMPLE);
             let _ = writeln!(
                 svg,
-                "<path d=\"M{},{}H{end}\" stroke=\"{}\" stroke-width=\"2.2\"/>",
+                "<path d=\"M{},{}H{end}\" {}/>",
                 coordinate(left),
                 coordinate(y),
-                colour(i)
+                curve.stroke()
             );
             if plot.curves.len() > 1 {
-                marker(svg, i, left + SAMPLE / 2.0, y);
+                marker(svg, curve.look, left + SAMPLE / 2.0, y);
             }
             for line in lines {
                 text(svg, left + INDENT, y + 4.0, "", line);

@@ -11,6 +11,7 @@
 //! - [`picture`]: a table of action values over two of the state's fields; [`frame`]: which ones
 //! - [`heat_map`], [`value_map`]: pictures in the terminal; [`picture_svg`]: as SVG
 //! - [`onnx`]: a network as an ONNX model; [`tensorboard`]: training for TensorBoard
+//! - `columns`: those of `episodes.csv` and `summary.csv`
 //! - `colours`: a perceptually uniform scale, and colours for actions
 //! - `legend`: the legend of the curves
 //! - `runs`: a variant's units, gathered for tables and plots
@@ -20,6 +21,7 @@ pub mod audit;
 pub mod claims;
 pub mod closing;
 mod colours;
+mod columns;
 pub mod compare;
 pub mod curves;
 pub mod frame;

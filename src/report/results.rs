@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::curves::{CurvesPlot, NATIVE_RETURN, VALUE_ERROR, curves_svg};
+use super::columns::{EpisodeColumns, summary_lines};
+use super::curves::{Curve, CurvesPlot, NATIVE_RETURN, START_VALUE, VALUE_ERROR, curves_svg};
 use super::manifest::{file_name, manifest};
 use super::runs::Runs;
 use super::summary::VariantSummary;
@@ -13,7 +14,7 @@ use super::tensorboard;
 use crate::experiment::{
     Audit, Execution, Store, StoreError, Unit, units, write_atomically, write_atomically_with,
 };
-use crate::script::Plan;
+use crate::script::{Plan, Variant};
 
 /// A study's folder.
 #[derive(Debug)]
@@ -98,7 +99,7 @@ impl Results {
     }
 
     /// Writes every derived file: `timing.json`, `episodes.csv`, `summary.json`, `summary.csv`,
-    /// `curves.svg`. All but the first depend on the plan alone.
+    /// `curves.svg`, and where a variant learns a network `values.svg`. All but the first depend on the plan alone.
     ///
     /// # Errors
     /// If a unit cannot be read or a file cannot be written.
@@ -114,9 +115,8 @@ impl Results {
         let mut failed = None;
         write_atomically_with(&path, |file| {
             let mut csv = csv::Writer::from_writer(file);
-            let terms = term_names(plan);
-            let predicts = plan.variants.iter().any(|v| v.agent.is_predictor());
-            csv.write_record(episode_header(&terms, predicts))?;
+            let columns = EpisodeColumns::of(plan);
+            csv.write_record(columns.header())?;
             for i in 0..plan.variants.len() {
                 let mut runs = Runs::default();
                 for unit in execution.units.iter().filter(|u| u.variant == i) {
@@ -128,11 +128,7 @@ impl Results {
                         }
                     };
                     for (episode, row) in stored.rows.iter().enumerate() {
-                        let mut line = episode_line(plan, unit, episode, row, &terms);
-                        if predicts {
-                            line.push(row.value_error.map_or_else(String::new, float));
-                        }
-                        csv.write_record(line)?;
+                        csv.write_record(columns.line(plan, unit, episode, row))?;
                     }
                     runs.push(&stored);
                 }
@@ -146,6 +142,16 @@ impl Results {
         self.summary(plan, &summaries, &audits)?;
         let plot = plot(plan, &all);
         write_atomically(&self.folder.join("curves.svg"), curves_svg(&plot).as_bytes())?;
+        let path = self.folder.join("values.svg");
+        match values_plot(plan, &all) {
+            Some(plot) => write_atomically(&path, curves_svg(&plot).as_bytes())?,
+            // That of another study of the same name, which was here before.
+            None if path.exists() => {
+                std::fs::remove_file(&path)
+                    .map_err(|e| StoreError::io(&path, "cannot be removed", &e))?;
+            }
+            None => {}
+        }
         Ok(Findings { summaries, audits, steps_per_second })
     }
 
@@ -167,14 +173,7 @@ impl Results {
         let path = self.folder.join("summary.csv");
         write_atomically_with(&path, |file| {
             let mut csv = csv::Writer::from_writer(file);
-            let predicts = summaries.iter().any(|s| s.value_error.is_some());
-            let more = if predicts { &VALUE_ERROR_HEADER[..] } else { &[] };
-            csv.write_record(SUMMARY_HEADER.iter().chain(more))?;
-            for (s, a) in summaries.iter().zip(audits) {
-                let mut line = summary_line(s, a);
-                if predicts {
-                    line.extend(value_error_cells(s));
-                }
+            for line in summary_lines(summaries, audits) {
                 csv.write_record(line)?;
             }
             csv.flush()
@@ -199,7 +198,7 @@ fn plot(plan: &Plan, all: &[Runs]) -> CurvesPlot {
     let runs = || plan.variants.iter().zip(all);
     let title = plan.name.clone();
     if all.iter().all(Runs::has_errors) {
-        let curves = runs().map(|(v, runs)| runs.error_curve(v)).collect();
+        let curves = runs().enumerate().map(|(i, (v, runs))| runs.error_curve(i, v)).collect();
         return CurvesPlot {
             title,
             quantity: VALUE_ERROR,
@@ -210,14 +209,35 @@ fn plot(plan: &Plan, all: &[Runs]) -> CurvesPlot {
     }
     let first = &plan.variants[0];
     let shared = plan.variants.iter().all(|v| v.threshold == first.threshold);
-    let same_window = plan.variants.iter().all(|v| v.window == first.window);
     CurvesPlot {
         title,
         quantity: NATIVE_RETURN,
-        window: same_window.then_some(first.window as usize),
+        window: same_window(plan.variants.iter()),
         threshold: first.threshold.filter(|_| shared),
-        curves: runs().map(|(v, runs)| runs.curve(v)).collect(),
+        curves: runs().enumerate().map(|(i, (v, runs))| runs.curve(i, v)).collect(),
     }
+}
+
+/// What networks believed at the start of episodes, and what these brought; `None` if no variant
+/// learns one.
+fn values_plot(plan: &Plan, all: &[Runs]) -> Option<CurvesPlot> {
+    let networks =
+        || plan.variants.iter().zip(all).enumerate().filter(|(_, (_, r))| r.has_starts());
+    let curves: Vec<Curve> =
+        networks().flat_map(|(i, (v, runs))| runs.start_curves(i, v)).collect();
+    (!curves.is_empty()).then(|| CurvesPlot {
+        title: plan.name.clone(),
+        quantity: START_VALUE,
+        window: same_window(networks().map(|(_, (v, _))| v)),
+        threshold: None,
+        curves,
+    })
+}
+
+/// The window of rolling means, if it is the same for all.
+fn same_window<'a>(mut variants: impl Iterator<Item = &'a Variant>) -> Option<usize> {
+    let first = variants.next()?.window;
+    variants.all(|v| v.window == first).then_some(first as usize)
 }
 
 /// How many steps a unit made and how many seconds it took, by its hash.
@@ -287,113 +307,16 @@ fn owned_by(folder: &Path, plan: &Plan) -> Result<Option<String>, FolderError> {
 
 /// Whether an import, copied beside the script, would overwrite a file of the results.
 fn is_ours(path: &str) -> bool {
-    const FILES: [&str; 7] = [
+    const FILES: [&str; 8] = [
         "study.json",
         "script.rhai",
         "episodes.csv",
         "summary.json",
         "summary.csv",
         "curves.svg",
+        "values.svg",
         "timing.json",
     ];
     let folder = path.split('/').next().unwrap_or(path);
     FILES.contains(&path) || ["units", tensorboard::FOLDER].contains(&folder)
-}
-
-fn term_names(plan: &Plan) -> Vec<&str> {
-    let mut names: Vec<&str> =
-        plan.variants.iter().flat_map(|v| v.terms.keys().map(String::as_str)).collect();
-    names.sort_unstable();
-    names.dedup();
-    names
-}
-
-/// A float as the shortest text that reads back as the same float.
-fn float(x: f64) -> String {
-    format!("{x:?}")
-}
-
-fn episode_header<'a>(terms: &[&'a str], predicts: bool) -> Vec<&'a str> {
-    let mut header =
-        vec!["variant", "seed", "episode", "steps", "return", "learned_return", "shaping"];
-    header.extend(terms);
-    header.extend(["epsilon", "ending"]);
-    header.extend(predicts.then_some("value_error"));
-    header
-}
-
-/// One line of `episodes.csv`; episodes count from 1, a term the variant does not have is empty.
-fn episode_line(
-    plan: &Plan,
-    unit: &Unit,
-    episode: usize,
-    row: &crate::experiment::EpisodeRow,
-    terms: &[&str],
-) -> Vec<String> {
-    let variant = &plan.variants[unit.variant];
-    let mut line = vec![
-        variant.name.clone(),
-        unit.seed.to_string(),
-        (episode + 1).to_string(),
-        row.steps.to_string(),
-        float(row.native),
-        float(row.learned),
-        float(row.shaping),
-    ];
-    for term in terms {
-        let i = variant.terms.keys().position(|name| name == term);
-        line.push(i.and_then(|i| row.terms.get(i)).map_or(String::new(), |x| float(*x)));
-    }
-    line.extend([float(row.epsilon), row.ending.as_str().to_string()]);
-    line
-}
-
-const SUMMARY_HEADER: [&str; 16] = [
-    "variant",
-    "seeds",
-    "episodes",
-    "window",
-    "return_mean",
-    "return_iqm",
-    "return_low",
-    "return_high",
-    "auc_mean",
-    "auc_iqm",
-    "auc_low",
-    "auc_high",
-    "threshold",
-    "solved_seeds",
-    "median_episode_solved",
-    "audit",
-];
-
-const VALUE_ERROR_HEADER: [&str; 4] =
-    ["value_error_mean", "value_error_iqm", "value_error_low", "value_error_high"];
-
-fn value_error_cells(s: &VariantSummary) -> [String; 4] {
-    let Some(error) = &s.value_error else { return Default::default() };
-    let maybe = |x: Option<f64>| x.map_or_else(String::new, float);
-    [float(error.mean), float(error.iqm), maybe(error.low), maybe(error.high)]
-}
-
-fn summary_line(s: &VariantSummary, audit: &Audit) -> Vec<String> {
-    let maybe = |x: Option<f64>| x.map_or_else(String::new, float);
-    vec![
-        s.name.clone(),
-        s.seeds.to_string(),
-        s.episodes.to_string(),
-        s.window.to_string(),
-        float(s.final_return.mean),
-        float(s.final_return.iqm),
-        maybe(s.final_return.low),
-        maybe(s.final_return.high),
-        float(s.auc.mean),
-        float(s.auc.iqm),
-        maybe(s.auc.low),
-        maybe(s.auc.high),
-        maybe(s.threshold),
-        s.solved.as_ref().map_or(String::new(), |x| x.seeds.to_string()),
-        maybe(s.solved.as_ref().and_then(|x| x.median_episode)),
-        audit.verdict.as_str().to_string(),
-    ]
 }

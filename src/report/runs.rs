@@ -2,9 +2,9 @@
 
 use super::curves::Curve;
 use super::summary::{OverSeeds, VariantSummary, summarise};
-use crate::experiment::StoredUnit;
+use crate::experiment::{StartValue, StoredUnit};
 use crate::script::Variant;
-use crate::stats::{curve_band, mean};
+use crate::stats::{CurveBand, curve_band, mean, rolling_mean_at};
 
 /// What tables and plots need of a variant's units.
 #[derive(Debug, Default)]
@@ -18,6 +18,11 @@ pub(super) struct Runs {
     errors: Vec<Vec<f64>>,
     /// The largest error of a state after the last episode, `[seeds]`.
     largest: Vec<f64>,
+    /// What a network believed at the start of each episode, the shape of `returns`; empty unless
+    /// the agent learns one.
+    believed: Vec<Vec<f64>>,
+    /// What these episodes brought.
+    brought: Vec<Vec<f64>>,
 }
 
 impl Runs {
@@ -34,6 +39,11 @@ impl Runs {
             let errors = unit.values.iter().filter_map(|(_, v, exact)| Some((v - (*exact)?).abs()));
             self.largest.push(errors.fold(0.0, f64::max));
         }
+        let starts = unit.rows.iter().map(|row| row.start).collect::<Option<Vec<StartValue>>>();
+        if let Some(starts) = starts.filter(|starts| !starts.is_empty()) {
+            self.believed.push(starts.iter().map(|s| s.believed).collect());
+            self.brought.push(starts.iter().map(|s| s.brought).collect());
+        }
     }
 
     /// Whether there are errors of values.
@@ -41,11 +51,23 @@ impl Runs {
         !self.errors.is_empty()
     }
 
+    /// Whether a network said what it believed at the start of episodes.
+    pub(super) fn has_starts(&self) -> bool {
+        !self.believed.is_empty()
+    }
+
     /// Their statistics.
     pub(super) fn summary(&self, variant: &Variant) -> VariantSummary {
         let Variant { name, threshold, .. } = variant;
         let (episodes, window) = (variant.episodes as usize, variant.window as usize);
-        let summary = summarise(name, &self.returns, &self.lengths, episodes, window, *threshold);
+        let mut summary =
+            summarise(name, &self.returns, &self.lengths, episodes, window, *threshold);
+        if self.has_starts() {
+            let last = |run: &Vec<f64>| rolling_mean_at(run, window, run.len());
+            let seeds = self.believed.iter().zip(&self.brought);
+            let beyond: Vec<f64> = seeds.map(|(v, g)| last(v) - last(g)).collect();
+            summary.overestimation = Some(OverSeeds::of(&beyond));
+        }
         if self.errors.is_empty() {
             return summary;
         }
@@ -59,16 +81,33 @@ impl Runs {
         }
     }
 
-    /// The learning curve of the native returns. It ends where every seed has stopped.
-    pub(super) fn curve(&self, variant: &Variant) -> Curve {
-        let longest = self.returns.iter().map(Vec::len).max().unwrap_or(0);
-        let band = curve_band(&self.returns, variant.window as usize, longest);
-        Curve { name: variant.name.clone(), band }
+    /// The learning curve of the native returns, of the `i`-th variant. It ends where every seed has
+    /// stopped.
+    pub(super) fn curve(&self, i: usize, variant: &Variant) -> Curve {
+        let band = curve_band(&self.returns, variant.window as usize, self.longest());
+        Curve { name: variant.name.clone(), look: i, dashed: false, band }
     }
 
     /// The curve of the errors.
-    pub(super) fn error_curve(&self, variant: &Variant) -> Curve {
+    pub(super) fn error_curve(&self, i: usize, variant: &Variant) -> Curve {
         let band = curve_band(&self.errors, 1, variant.episodes as usize);
-        Curve { name: variant.name.clone(), band }
+        Curve { name: variant.name.clone(), look: i, dashed: false, band }
+    }
+
+    /// What was believed at the start of episodes, and what these brought, of the `i`-th variant.
+    pub(super) fn start_curves(&self, i: usize, variant: &Variant) -> [Curve; 2] {
+        let window = variant.window as usize;
+        let of = |what: &str, values: &[Vec<f64>], dashed| {
+            let band = curve_band(values, window, self.longest());
+            // No thin line of the mean beside each: two a variant are enough.
+            let band = CurveBand { mean: band.iqm.clone(), ..band };
+            Curve { name: format!("{}: {what}", variant.name), look: i, dashed, band }
+        };
+        [of("believed", &self.believed, false), of("brought", &self.brought, true)]
+    }
+
+    /// How many episodes the seed played that played most.
+    fn longest(&self) -> usize {
+        self.returns.iter().map(Vec::len).max().unwrap_or(0)
     }
 }

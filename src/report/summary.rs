@@ -87,6 +87,11 @@ pub struct VariantSummary {
     /// The mean of the errors after each episode.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value_error_auc: Option<OverSeeds>,
+    /// What a network believed in the first state of an episode beyond the discounted learned return
+    /// that the episode brought: the mean over the last `window` episodes of each seed. `None` for
+    /// other agents.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub overestimation: Option<OverSeeds>,
     /// Mean steps per episode, over all episodes that were played.
     pub mean_steps: f64,
     /// The values behind `final_return`, `[seeds]`.
@@ -143,6 +148,7 @@ pub fn summarise(
         value_error: None,
         value_error_max: None,
         value_error_auc: None,
+        overestimation: None,
         mean_steps: steps as f64 / episodes_in_all as f64,
         final_returns,
         warnings,

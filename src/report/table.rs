@@ -19,10 +19,11 @@ const HEADINGS: [&str; COLUMNS] = [
     "final IQM [95 %]",
     "solved after",
     "value error [95 %]",
+    "overest.",
     "steps/s",
     "audit",
 ];
-const COLUMNS: usize = 7;
+const COLUMNS: usize = 8;
 const LAST: usize = COLUMNS - 1;
 
 /// What the table shows.
@@ -53,6 +54,8 @@ pub struct TableRow {
     /// The error of a predictor's values after the last episode: the interquartile mean over seeds,
     /// and its 95 % interval.
     pub value_error: Option<(f64, Option<(f64, f64)>)>,
+    /// What a network believes of first states beyond what they bring: the interquartile mean.
+    pub overestimation: Option<f64>,
     /// Steps per second while training; `None` if nothing was run (all results were there).
     pub steps_per_second: Option<f64>,
     /// The audit's verdict in a few words; empty if there was nothing to audit.
@@ -70,6 +73,7 @@ impl TableRow {
             interval: summary.final_return.limits(),
             solved: summary.solved.as_ref().map(|s| (s.seeds, s.median_episode)),
             value_error: summary.value_error.as_ref().map(|e| (e.iqm, e.limits())),
+            overestimation: summary.overestimation.as_ref().map(|e| e.iqm),
             steps_per_second,
             verdict,
         }
@@ -169,6 +173,7 @@ impl TableRow {
             bounded(self.iqm, self.interval, decimals),
             solved,
             value_error.unwrap_or_default(),
+            self.overestimation.map_or_else(String::new, |x| fixed(x, decimals)),
             speed,
             self.verdict.clone(),
         ]
@@ -317,6 +322,7 @@ mod tests {
             steps_per_second: Some(12_345_678.0),
             verdict: "preserves the policy".into(),
             value_error: None,
+            overestimation: None,
         }
     }
 

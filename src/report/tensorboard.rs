@@ -194,6 +194,7 @@ mod tests {
             epsilon: 0.5,
             ending: Ending::Terminated,
             value_error: None,
+            start: None,
         }
     }
 

@@ -305,8 +305,10 @@ impl ExperimentDraft {
 }
 
 /// Columns of `episodes.csv` that no term may take.
-const TAKEN_COLUMNS: [&str; 10] = [
+const TAKEN_COLUMNS: [&str; 12] = [
     "value_error",
+    "start_value",
+    "start_return",
     "variant",
     "seed",
     "episode",

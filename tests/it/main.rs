@@ -1,6 +1,7 @@
 //! Integration tests: one binary, one module a subject.
 
 mod audit;
+mod believed;
 mod blackjack;
 mod book_control;
 mod book_figures;

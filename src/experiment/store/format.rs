@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::experiment::hex;
-use crate::experiment::record::{EpisodeRow, StateValues, UnitRecord};
+use crate::experiment::record::{EpisodeRow, StartValue, StateValues, UnitRecord};
 use crate::learn::planning::Sweep;
 use crate::learn::{ParamValue, QTable, argmax_tol};
 use crate::mdp::Ending;
@@ -63,6 +63,9 @@ pub(super) const NEVER: &str = "writing to memory does not fail";
 /// The column of a predictor's errors.
 const VALUE_ERROR: &str = "value_error";
 
+/// The columns of what a network believed at the start of an episode and what that brought.
+const START: [&str; 2] = ["start_value", "start_return"];
+
 /// Stable-Baselines3's monitor format: a JSON comment, then r, l, t and columns of our own. The
 /// time t is 0: wall time would make two equal runs differ; it is in `timing.json`.
 pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
@@ -73,6 +76,10 @@ pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
     let has_errors = record.rows.iter().any(|row| row.value_error.is_some());
     if has_errors {
         header.push(VALUE_ERROR);
+    }
+    let has_starts = record.rows.iter().any(|row| row.start.is_some());
+    if has_starts {
+        header.extend(START);
     }
     header.extend(variant.terms.keys().map(String::as_str));
     csv.write_record(&header).expect(NEVER);
@@ -89,6 +96,10 @@ pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
         if has_errors {
             line.push(row.value_error.map_or_else(String::new, float));
         }
+        if has_starts {
+            let start = |of: fn(&StartValue) -> f64| row.start.map_or(0.0, |start| of(&start));
+            line.extend([float(start(|s| s.believed)), float(start(|s| s.brought))]);
+        }
         line.extend(row.terms.iter().map(|x| float(*x)));
         csv.write_record(&line).expect(NEVER);
     }
@@ -99,7 +110,8 @@ pub(super) fn monitor(variant: &Variant, record: &UnitRecord) -> Vec<u8> {
 pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(bytes);
     let has_errors = reader.headers().is_ok_and(|header| header.get(7) == Some(VALUE_ERROR));
-    let first_term = if has_errors { 8 } else { 7 };
+    let has_starts = reader.headers().is_ok_and(|header| header.get(7) == Some(START[0]));
+    let first_term = 7 + usize::from(has_errors) + if has_starts { 2 } else { 0 };
     let mut rows = Vec::new();
     for (i, line) in reader.records().enumerate() {
         let line = line.map_err(|e| e.to_string())?;
@@ -114,6 +126,10 @@ pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
             value_error: match line.get(7) {
                 Some(x) if has_errors && !x.is_empty() => Some(number(7)?),
                 _ => None,
+            },
+            start: match has_starts {
+                true => Some(StartValue { believed: number(7)?, brought: number(8)? }),
+                false => None,
             },
             ending: match line.get(6) {
                 Some("terminated") => Ending::Terminated,

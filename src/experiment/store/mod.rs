@@ -51,7 +51,7 @@ impl StoreError {
         Self { path: path.to_path_buf(), message: message.into() }
     }
 
-    fn io(path: &Path, what: &str, error: &io::Error) -> Self {
+    pub(crate) fn io(path: &Path, what: &str, error: &io::Error) -> Self {
         // Without the name of a temporary file, which says nothing to anybody.
         let text = error.to_string();
         Self::new(path, format!("{what}: {}", text.split(" at path ").next().unwrap_or(&text)))

@@ -186,6 +186,12 @@ impl Dqn {
         self.counts.failed
     }
 
+    /// The value that the best action was believed to have in the first state of the last episode,
+    /// and the discounted return that the episode then brought.
+    pub fn last_start(&self) -> (f64, f64) {
+        (self.start[0], self.start[1])
+    }
+
     /// Steps made.
     pub fn steps(&self) -> u64 {
         self.counts.steps
