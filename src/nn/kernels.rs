@@ -133,15 +133,16 @@ impl Kernels {
     /// What the instruction set is called.
     pub fn name(self) -> &'static str {
         #[cfg(target_arch = "x86_64")]
-        if self.level.as_avx512().is_some() {
-            return "AVX-512";
+        let name = if self.level.as_avx512().is_some() {
+            "AVX-512"
         } else if self.level.as_avx2().is_some() {
-            return "AVX2";
+            "AVX2"
         } else {
-            return "SSE2";
-        }
+            "SSE2"
+        };
         #[cfg(not(target_arch = "x86_64"))]
-        "NEON"
+        let name = "NEON";
+        name
     }
 
     /// `y = x w + b` for every row of `y`, shape `[rows, width]`.
