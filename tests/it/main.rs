@@ -10,6 +10,7 @@ mod crash;
 mod env;
 mod floors;
 mod frozen_lake;
+mod further;
 mod golden;
 mod interrupted;
 mod language;
