@@ -102,7 +102,7 @@ impl<T: Real> Gradient<T> {
             let mean = mean(&row[..n_actions]);
             row[n_actions] = mean * T::of(n_actions as f64);
             for d in &mut row[..n_actions] {
-                *d = *d - mean;
+                *d -= mean;
             }
         }
     }

@@ -11,6 +11,11 @@
 //!
 //! How many rows and columns are worked on at once (`R`, `C`) therefore changes nothing but speed.
 
+#![allow(
+    clippy::inline_always,
+    reason = "a loop is compiled for an instruction set only as a part of what `vectorize` calls"
+)]
+
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdFloat};
 
 use super::Real;
@@ -125,9 +130,23 @@ impl Kernels {
         levels.into_iter().flatten().map(|level| Self { level }).collect()
     }
 
+    /// What the instruction set is called.
+    pub fn name(self) -> &'static str {
+        #[cfg(target_arch = "x86_64")]
+        if self.level.as_avx512().is_some() {
+            return "AVX-512";
+        } else if self.level.as_avx2().is_some() {
+            return "AVX2";
+        } else {
+            return "SSE2";
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        "NEON"
+    }
+
     /// `y = x w + b` for every row of `y`, shape `[rows, width]`.
     pub(super) fn affine<T: Real>(self, a: &Affine<'_, T>, width: usize, y: &mut [T]) {
-        dispatch!(self.level, |simd, WIDE| affine::<_, T, WIDE>(simd, a, width, y))
+        dispatch!(self.level, |simd, WIDE| affine::<_, T, WIDE>(simd, a, width, y));
     }
 
     /// `dw = xᵀ dy` and `db = Σ dy`: `x` has `rows` rows of `n_inputs` numbers, `stride` apart, `dy`
@@ -142,7 +161,7 @@ impl Kernels {
         dispatch!(self.level, |simd, WIDE| {
             outer::<_, T, WIDE>(simd, x, dy, width, dw);
             sums::<_, T>(simd, dy, width, db);
-        })
+        });
     }
 
     /// One step of Adam (Kingma & Ba 2015, algorithm 1) on `params`, with the moments `m` and `v`.
@@ -153,17 +172,17 @@ impl Kernels {
         (m, v): (&mut [T], &mut [T]),
         params: &mut [T],
     ) {
-        dispatch!(self.level, |simd, _WIDE| adam(simd, step, gradient, (m, v), params))
+        dispatch!(self.level, |simd, _WIDE| adam(simd, step, gradient, (m, v), params));
     }
 
     /// `to += rate · (from − to)`.
     pub(super) fn blend<T: Real>(self, rate: T, from: &[T], to: &mut [T]) {
-        dispatch!(self.level, |simd, _WIDE| blend(simd, rate, from, to))
+        dispatch!(self.level, |simd, _WIDE| blend(simd, rate, from, to));
     }
 
     /// `x *= factor`.
     pub(super) fn scale<T: Real>(self, factor: T, x: &mut [T]) {
-        dispatch!(self.level, |simd, _WIDE| scale(simd, factor, x))
+        dispatch!(self.level, |simd, _WIDE| scale(simd, factor, x));
     }
 
     /// Σ x².
@@ -256,10 +275,9 @@ fn affine_block<S: Simd, T: Real, const R: usize, const C: usize>(
         }
     }
     let zero: T::Vector<S> = splat(simd, T::default());
-    for i in 0..R {
-        for c in 0..C {
+    for (i, sums) in sums.into_iter().enumerate() {
+        for (c, sum) in sums.into_iter().enumerate() {
             let at = (r + i) * width + j + c * T::LANES;
-            let sum = sums[i][c];
             let result = match a.gate {
                 Gate::Open => sum,
                 Gate::Relu => sum.simd_lt(zero).select(zero, sum),

@@ -16,6 +16,8 @@ mod kernels;
 mod loss;
 mod mlp;
 mod real;
+#[cfg(test)]
+mod tests;
 
 pub use adam::Adam;
 pub use buffer::Buffer;

@@ -15,6 +15,7 @@ pub trait Real:
     + std::ops::Div<Output = Self>
     + std::ops::Neg<Output = Self>
     + std::ops::AddAssign
+    + std::ops::SubAssign
     + fearless_simd::SimdFloatElement
     + 'static
 {
@@ -74,6 +75,7 @@ impl Real for f64 {
         self
     }
 
+    #[allow(clippy::disallowed_methods, reason = "networks are to be rounded once")]
     fn mul_add(self, a: Self, b: Self) -> Self {
         self.mul_add(a, b)
     }

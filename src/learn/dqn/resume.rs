@@ -34,7 +34,7 @@ impl Dqn {
             to.put("largest_priority", &largest);
             to.put("beta", &beta.state());
         }
-        let log = self.log.iter().flat_map(|row| numbers(row));
+        let log = self.log.iter().flat_map(numbers);
         to.doubles.insert("log".into(), log.collect());
     }
 

@@ -18,6 +18,9 @@ pub struct Snapshot {
 
 impl Snapshot {
     /// Keeps a value.
+    ///
+    /// # Panics
+    /// If the value cannot be written as JSON.
     pub fn put<T: Serialize>(&mut self, name: &str, value: &T) {
         let json = serde_json::to_string(value).expect("numbers, lists and maps can be written");
         self.values.insert(name.into(), json);

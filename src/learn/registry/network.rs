@@ -63,7 +63,7 @@ const PARAMS: &[ParamSpec] = &[
     },
     count("train_freq", 1, "steps between two trainings"),
     count("gradient_steps", 1, "minibatches of a training"),
-    count("target_update_interval", 100, "steps between two updates of the target network"),
+    count("target_update_interval", 50, "steps between two updates of the target network"),
     ParamSpec {
         name: "tau",
         kind: ParamKind::Float { min: 0.0, max: 1.0, open: true },
