@@ -91,9 +91,9 @@ fn the_start_is_part_of_the_units_that_learn_networks() {
     let mut further = plan.clone();
     start_from(&mut further, &file).unwrap();
     assert_eq!(plan.variants[0].identity().get("start"), None);
-    let digest: String =
-        Sha256::digest(std::fs::read(&file).unwrap()).iter().map(|b| format!("{b:02x}")).collect();
-    assert_eq!(further.variants[0].identity()["start"]["sha256"], digest.as_str());
+    let digest = Sha256::digest(std::fs::read(&file).unwrap());
+    let digest = digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
+    assert_eq!(further.variants[0].identity()["start"]["sha256"], digest);
     let hashes = |plan| units(plan).into_iter().map(|u| u.hash).collect::<Vec<_>>();
     let (before, after) = (hashes(&plan), hashes(&further));
     assert!(before[..2].iter().zip(&after).all(|(a, b)| a != b));

@@ -196,7 +196,7 @@ experiment(#{
     assert!(text.contains("`max_grad_norm`"), "{text}");
     let files = contents(&out);
     let log = files.iter().find(|(name, _)| name.ends_with(".failed/learning.csv")).unwrap();
-    let text = std::str::from_utf8(&log.1).unwrap();
+    let text = std::str::from_utf8(log.1).unwrap();
     assert_eq!(text.lines().count(), 21, "{text}");
     let monitor = files.iter().find(|(name, _)| name.ends_with(".failed/monitor.csv")).unwrap();
     assert!(monitor.1.split(|b| *b == b'\n').count() > 50, "episodes of some 20 steps");
