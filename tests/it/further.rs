@@ -92,7 +92,8 @@ fn the_start_is_part_of_the_units_that_learn_networks() {
     start_from(&mut further, &file).unwrap();
     assert_eq!(plan.variants[0].identity().get("start"), None);
     let digest = Sha256::digest(std::fs::read(&file).unwrap());
-    let digest = digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
+    let digest =
+        digest.iter().fold(String::new(), |text, byte| text + format!("{byte:02x}").as_str());
     assert_eq!(further.variants[0].identity()["start"]["sha256"], digest);
     let hashes = |plan| units(plan).into_iter().map(|u| u.hash).collect::<Vec<_>>();
     let (before, after) = (hashes(&plan), hashes(&further));
