@@ -11,7 +11,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
-use crate::experiment::{Audit, ExecuteError, Execution, Progress, audit_variant, check, execute};
+use crate::experiment::{
+    Audit, ExecuteError, Execution, Progress, audit_variant, check, execute, start_from,
+};
 use crate::report::claims::{judge, rehearse};
 use crate::report::closing::closing_table;
 use crate::report::results::{Findings, FolderError, Results};
@@ -31,6 +33,9 @@ pub(super) struct Args {
     /// Episodes per seed, instead of the script's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     episodes: Option<u32>,
+    /// A stored network that every network of the study starts from, in place of random ones
+    #[arg(long, value_name = "MODEL")]
+    from: Option<PathBuf>,
     /// Threads [default: all cores]; results do not depend on it
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -48,6 +53,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut plan = load(&args.script)?;
     restrict(&mut plan, args);
+    if let Some(model) = &args.from {
+        start_from(&mut plan, model)?;
+    }
     say(&plan, args.quiet);
     for line in check(&plan)? {
         note(&line);
@@ -179,6 +187,7 @@ fn resume(args: &Args) -> String {
     add("--out", args.out.as_ref().map(|p| p.display().to_string()));
     add("--seeds", args.seeds.map(|n| n.to_string()));
     add("--episodes", args.episodes.map(|n| n.to_string()));
+    add("--from", args.from.as_ref().map(|p| p.display().to_string()));
     add("--jobs", args.jobs.map(|n| n.to_string()));
     if args.tensorboard {
         command.push_str(" --tensorboard");

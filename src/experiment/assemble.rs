@@ -355,7 +355,9 @@ pub(super) fn network_agent<E: Env>(variant: &Variant, env: &E, seed: u64) -> Dq
         n_actions: env.n_actions(),
         shielded: variant.allowed.is_some(),
         seed,
-        model: None,
+        model: variant.start.as_ref().map(|start| {
+            start.file.as_ref().expect("a plan that was read back is not run").net.clone()
+        }),
     };
     build(&variant.agent, setup)
 }

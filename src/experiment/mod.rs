@@ -3,6 +3,7 @@
 //! - [`train`]: the training loop, the same for every environment, agent and shaping
 //! - [`run_unit`]: one variant under one seed
 //! - [`execute`]: all units of a plan on threads, skipping those already stored
+//! - [`start_from`]: networks that are trained further
 //! - [`Store`]: one immutable folder per unit, committed by an atomic rename
 //! - [`check`]: calls every callback on sampled states before anything is run
 //! - [`audit_variant`]: what can be said about a variant's shaping
@@ -14,6 +15,7 @@ mod audit;
 mod check;
 mod endless;
 mod execute;
+mod further;
 pub mod golden;
 mod interrupted;
 mod landscape;
@@ -43,6 +45,7 @@ pub use audit::{
 };
 pub use check::check;
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
+pub use further::start_from;
 pub use interrupted::Resumable;
 pub use landscape::{Landscape, ListedState};
 pub use predict::has_exact_values;

@@ -16,6 +16,9 @@ use crate::experiment::{
 };
 use crate::script::{Plan, Variant};
 
+/// The network that training has started from, if one was given.
+pub(super) const START_FILE: &str = "start.safetensors";
+
 /// A study's folder.
 #[derive(Debug)]
 pub struct Results {
@@ -79,6 +82,10 @@ impl Results {
         let text = serde_json::to_string_pretty(&manifest(plan, jobs)).expect("plain data");
         write("study.json", format!("{text}\n").as_bytes())?;
         write("script.rhai", plan.sources.script.text.as_bytes())?;
+        let start = plan.variants.iter().find_map(|v| v.start.as_ref()?.file.as_ref());
+        if let Some(start) = start {
+            write(START_FILE, &start.bytes)?;
+        }
         for (path, source) in &plan.sources.imports {
             let target = folder.join(path);
             if let Some(parent) = target.parent() {
@@ -307,9 +314,10 @@ fn owned_by(folder: &Path, plan: &Plan) -> Result<Option<String>, FolderError> {
 
 /// Whether an import, copied beside the script, would overwrite a file of the results.
 fn is_ours(path: &str) -> bool {
-    const FILES: [&str; 8] = [
+    const FILES: [&str; 9] = [
         "study.json",
         "script.rhai",
+        START_FILE,
         "episodes.csv",
         "summary.json",
         "summary.csv",

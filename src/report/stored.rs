@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::results::{Findings, rate, read_times};
+use super::results::{Findings, START_FILE, rate, read_times};
 use super::runs::Runs;
 use crate::experiment::play::session;
 use crate::experiment::{
     Checkpoint, Learned, Model, SEMANTICS, Store, StoreError, StoredUnit, Unit, audit_variant,
     units,
 };
-use crate::script::{Diagnostic, Host, Plan, SeedList, Source, Variant, load, suggest};
+use crate::script::{Diagnostic, Host, Plan, SeedList, Source, StartModel, Variant, load, suggest};
 
 /// A study that was run, or begun.
 #[derive(Debug)]
@@ -85,7 +85,7 @@ impl Stored {
                 "run the script again, into another folder",
             ));
         }
-        let options = adopt(&mut plan, identity);
+        let options = adopt(&mut plan, identity, folder);
         let units = units(&plan);
         if let Some(what) = difference(&plan, &units, identity) {
             return Err(StoredError::new(
@@ -303,10 +303,10 @@ fn studies_near(folder: &Path) -> Vec<String> {
     found
 }
 
-/// Gives the plan's variants the episodes and seeds with which they were run (`exec --episodes`
-/// and `--seeds` change them); returns these options.
-fn adopt(plan: &mut Plan, identity: &Value) -> String {
-    let mut options = [String::new(), String::new()];
+/// Gives the plan's variants the episodes, seeds and networks with which they were run (`exec
+/// --episodes`, `--seeds` and `--from` change them); returns these options.
+fn adopt(plan: &mut Plan, identity: &Value, folder: &Path) -> String {
+    let mut options = [const { String::new() }; 3];
     for variant in &mut plan.variants {
         let Some(run) = manifest_variant(identity, &variant.name) else { continue };
         if let Some(seeds) = run["seeds"].as_array() {
@@ -321,6 +321,10 @@ fn adopt(plan: &mut Plan, identity: &Value) -> String {
         {
             options[1] = format!(" --episodes {n}");
             variant.episodes = n;
+        }
+        if let Some(digest) = run["identity"]["start"]["sha256"].as_str() {
+            options[2] = format!(" --from {}", folder.join(START_FILE).display());
+            variant.start = Some(StartModel { digest: digest.to_string(), file: None });
         }
     }
     options.concat()

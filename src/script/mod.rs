@@ -39,7 +39,8 @@ pub(crate) use diagnostic::suggest;
 pub use diagnostic::{Diagnostic, Place, Severity};
 pub use host::{Host, load};
 pub use plan::{
-    Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, Variant,
+    Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, StartFile,
+    StartModel, Variant,
 };
 pub use shaping::{AdviceOn, Shaping};
 pub use source::{Source, SourceSet};

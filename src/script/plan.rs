@@ -1,6 +1,7 @@
 //! What a script's top level builds: plain data, which can be hashed, sent to threads, resumed.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::Serialize;
 use serde_json::{Map, Value as Json};
@@ -11,6 +12,7 @@ use super::source::SourceSet;
 use super::value::Value;
 use crate::env::{AnyEnv, EnvConfig, EnvError, EnvSpec};
 use crate::learn::AgentConfig;
+use crate::nn::Mlp;
 use crate::shaping::{Dim, FeatureKind, FeatureSpec, Scale};
 
 /// A script function that the host calls while training.
@@ -85,6 +87,24 @@ impl DiscretiserSpec {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SeedList(pub Vec<u64>);
 
+/// A stored network that training starts from. No script names one: it is given with the command.
+#[derive(Debug, Clone)]
+pub struct StartModel {
+    /// SHA-256 of its file, in hexadecimal.
+    pub digest: String,
+    /// The file; `None` in a plan that was read back from results, which needs its digest alone.
+    pub file: Option<Arc<StartFile>>,
+}
+
+/// The file of a network.
+#[derive(Debug)]
+pub struct StartFile {
+    /// What it holds.
+    pub bytes: Vec<u8>,
+    /// The network.
+    pub net: Mlp<f32>,
+}
+
 /// One experiment, fully resolved.
 #[derive(Debug, Clone)]
 pub struct Variant {
@@ -105,6 +125,8 @@ pub struct Variant {
     pub normalise: Vec<Scale>,
     /// The agent.
     pub agent: AgentConfig,
+    /// What its network starts from; `None` for a random one, and for other agents.
+    pub start: Option<StartModel>,
     /// Functions among its parameters, by their keys.
     pub agent_functions: BTreeMap<&'static str, Callback>,
     /// State → cell, or → features.
@@ -248,6 +270,9 @@ impl Variant {
             "agent_functions": functions,
             "allowed": self.allowed.as_ref().map(digest),
         });
+        if let Some(start) = &self.start {
+            identity["start"] = serde_json::json!({ "sha256": start.digest });
+        }
         // Elsewhere threshold and window only measure.
         if let Some(threshold) = self.stops_at() {
             identity["stop_when_solved"] =

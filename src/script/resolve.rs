@@ -152,6 +152,7 @@ impl Resolver<'_> {
             clip_reward: setting.clip_reward.as_ref().map(|c| c.value),
             normalise,
             agent: agent.value,
+            start: None,
             agent_functions,
             discretiser,
             episodes,

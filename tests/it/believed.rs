@@ -20,7 +20,7 @@ study("believed", [
 .expect("at first they believe nothing", |r| r.dqn.overestimation.mean < 0.0)
 "#;
 
-/// The rows of `episodes.csv` of a variant: seed, start_value, start_return, steps.
+/// The rows of `episodes.csv` of a variant: seed, `start_value`, `start_return`, steps.
 fn episodes(results: &Path, variant: &str) -> Vec<[String; 4]> {
     let text = std::fs::read_to_string(results.join("episodes.csv")).unwrap();
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
@@ -47,7 +47,7 @@ fn overestimation_is_what_is_believed_beyond_what_is_brought() {
         for [_, _, brought, steps] in &own[20..] {
             // A reward of 1 a step, discounted by 0.9.
             let (brought, steps) = (number(brought), number(steps));
-            let sum = (0..steps as u32).map(|t| 0.9f64.powi(t as i32)).sum::<f64>();
+            let sum = (0..steps as u32).fold(0.0, |sum, _| 1.0 + 0.9 * sum);
             assert!((brought - sum).abs() < 1e-12, "{brought} for {steps} steps");
         }
         let last = own[20..].iter().map(|row| number(&row[1]) - number(&row[2]));

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use runner::env::{EnvVisitor, make, specs};
 use runner::experiment::{
-    Resumable, Store, Unit, UnitError, UnitRecord, resume_unit, run_unit, units,
+    Resumable, Store, Unit, UnitError, UnitRecord, resume_unit, run_unit, start_from, units,
 };
 use runner::mdp::Env;
 use runner::mdp::numpy::NumpyRng;
@@ -94,6 +94,24 @@ fn an_interrupted_network_ends_in_the_same_bytes() {
         assert_eq!(now, 40 - stops[stops.len() - 1], "what was done is not done again");
         assert_eq!(contents(&parts), contents(&whole), "{stops:?}");
     }
+}
+
+/// The same of one that has started from a stored network.
+#[test]
+fn a_network_that_is_trained_further_ends_in_the_same_bytes() {
+    let mut plan = plan_of(SCRIPT, &[]);
+    let dir = folder();
+    let first = Store::open(&dir.path().join("first")).unwrap();
+    let unit = units(&plan).remove(0);
+    to_the_end(&plan, &unit, &first);
+    start_from(&mut plan, &first.path(&unit).join("model.safetensors")).unwrap();
+    let unit = &units(&plan)[0];
+    let (whole, parts) = (dir.path().join("whole"), dir.path().join("parts"));
+    to_the_end(&plan, unit, &Store::open(&whole).unwrap());
+    let store = Store::open(&parts).unwrap();
+    until(&plan, unit, &store, 15);
+    assert_eq!(to_the_end(&plan, unit, &store).1, 25);
+    assert_eq!(contents(&parts), contents(&whole));
 }
 
 /// A file that is damaged, or another unit's, costs time and nothing else.

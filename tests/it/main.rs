@@ -11,6 +11,7 @@ mod dqn;
 mod env;
 mod floors;
 mod frozen_lake;
+mod further;
 mod golden;
 mod interrupted;
 mod language;

@@ -127,9 +127,10 @@ pub(super) fn read_monitor(bytes: &[u8]) -> Result<Vec<EpisodeRow>, String> {
                 Some(x) if has_errors && !x.is_empty() => Some(number(7)?),
                 _ => None,
             },
-            start: match has_starts {
-                true => Some(StartValue { believed: number(7)?, brought: number(8)? }),
-                false => None,
+            start: if has_starts {
+                Some(StartValue { believed: number(7)?, brought: number(8)? })
+            } else {
+                None
             },
             ending: match line.get(6) {
                 Some("terminated") => Ending::Terminated,

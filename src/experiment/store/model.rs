@@ -160,7 +160,7 @@ impl Model {
         Self::decode(&bytes).map_err(|what| StoreError::new(path, what))
     }
 
-    pub(super) fn decode(bytes: &[u8]) -> Result<Self, String> {
+    pub(in crate::experiment) fn decode(bytes: &[u8]) -> Result<Self, String> {
         let (tensors, manifest) = decode(bytes)?;
         match manifest.get(VERSION.0) {
             Some(version) if version == VERSION.1 => {}
