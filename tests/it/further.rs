@@ -1,5 +1,6 @@
 //! Networks that are trained further, from a stored one.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::atomic::AtomicBool;
@@ -92,7 +93,10 @@ fn the_start_is_part_of_the_units_that_learn_networks() {
     start_from(&mut further, &file).unwrap();
     assert_eq!(plan.variants[0].identity().get("start"), None);
     let digest = Sha256::digest(std::fs::read(&file).unwrap());
-    let digest = digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
+    let digest = digest.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").unwrap();
+        text
+    });
     assert_eq!(further.variants[0].identity()["start"]["sha256"], digest);
     let hashes = |plan| units(plan).into_iter().map(|u| u.hash).collect::<Vec<_>>();
     let (before, after) = (hashes(&plan), hashes(&further));
