@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use runner::experiment::{Model, run_unit, start_from, units};
+use runner::experiment::{Checkpoint, Model, UnitRecord, run_unit, start_from, units};
 use runner::script::Host;
 
 use crate::language::plan_of;
@@ -80,8 +80,12 @@ fn training_starts_from_the_stored_weights() {
     };
     let (random, further) = (play(&plan), play(&further));
     assert_ne!(random.rows, further.rows);
-    assert_eq!(random.networks.last().unwrap().net, start, "the first study's own");
-    assert_ne!(further.networks.last().unwrap().net, start);
+    let last = |record: &UnitRecord| {
+        let mut networks = record.networks.iter();
+        networks.find(|network| network.which == Checkpoint::Last).unwrap().net.clone()
+    };
+    assert_eq!(last(&random), start, "the first study's own");
+    assert_ne!(last(&further), start);
 }
 
 #[test]
