@@ -97,15 +97,10 @@ fn the_start_is_part_of_the_units_that_learn_networks() {
     start_from(&mut further, &file).unwrap();
     assert_eq!(plan.variants[0].identity().get("start"), None);
     let digest = Sha256::digest(std::fs::read(&file).unwrap());
-<<<<<<< HEAD
-    let digest =
-        digest.iter().fold(String::new(), |text, byte| text + format!("{byte:02x}").as_str());
-=======
     let digest = digest.iter().fold(String::new(), |mut text, byte| {
         write!(text, "{byte:02x}").unwrap();
         text
     });
->>>>>>> report
     assert_eq!(further.variants[0].identity()["start"]["sha256"], digest);
     let hashes = |plan| units(plan).into_iter().map(|u| u.hash).collect::<Vec<_>>();
     let (before, after) = (hashes(&plan), hashes(&further));
