@@ -77,6 +77,7 @@ fn describe(host: &Host, variant: &Variant, out: &mut String) -> Result<(), Diag
         if let (Some(weights), Some(features)) = (&record.weights, features(variant)) {
             linear(&LinearQ::from_weights(features, weights.clone()), variant, &look, i == 0, out);
         }
+        network(&record, out);
         if let Some(values) = &record.values {
             state_values(&record, values, out);
         }
@@ -135,6 +136,19 @@ fn state_values(record: &UnitRecord, values: &StateValues, out: &mut String) {
 /// Pins every set without listing them all.
 fn digest(sets: &[Vec<usize>]) -> String {
     hex(&Sha256::digest(format!("{sets:?}").as_bytes())[..8])
+}
+
+/// Every bit of the network that was learned, which is the same on every machine, and where its
+/// training ended.
+fn network(record: &UnitRecord, out: &mut String) {
+    let Some(last) = record.networks.first() else { return };
+    let bits = last.net.params().iter().flat_map(|w| w.to_bits().to_le_bytes());
+    let bits: Vec<u8> = bits.collect();
+    writeln!(out, "    network {}", hex(&Sha256::digest(&bits)[..8])).expect(MEMORY);
+    if let Some((row, loss)) = record.log.last().and_then(|row| Some((row, row.loss?))) {
+        let (step, updates) = (row.step, row.updates);
+        writeln!(out, "    loss {loss:.6e} after {step} steps, {updates} updates").expect(MEMORY);
+    }
 }
 
 /// What is needed of the environment to draw.
