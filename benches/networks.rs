@@ -36,6 +36,7 @@ fn time(n: usize, mut f: impl FnMut()) -> f64 {
 const SUMS: usize = 24;
 const ROUNDS: usize = 1000;
 
+#[expect(clippy::inline_always, reason = "compiled for the instruction set of its caller")]
 #[inline(always)]
 fn sums<S: Simd>(simd: S, x: f32) -> f32 {
     let (x, mut sums) = (f32x16::splat(simd, x), [f32x16::splat(simd, 0.0); SUMS]);
