@@ -1,8 +1,10 @@
 //! Training that is interrupted goes on as if it had not been.
 
 use super::shadow::configs;
-use super::{Chance, agent, config, setup};
+use super::{Chance, agent, config, fields, setup};
 use crate::learn::dqn::{Dqn, DqnConfig, Snapshot};
+use crate::learn::{Last, Learn};
+use crate::shaping::ActionSet;
 
 fn saved(agent: &Dqn) -> Snapshot {
     let mut snapshot = Snapshot::default();
@@ -44,6 +46,20 @@ fn an_agent_goes_on_where_it_was() {
             }
         }
     }
+}
+
+/// Of a terminal state nothing is known: not even that an earlier state was something.
+#[test]
+fn an_episode_of_one_step_leaves_the_same_numbers() {
+    let mut through = agent(&config());
+    let mut world = Chance::new(false);
+    (0..12).for_each(|_| world.episode(&mut through, |_, _| {}));
+    let mut resumed = agent(&config()).restore(&saved(&through)).unwrap();
+    for agent in [&mut through, &mut resumed] {
+        agent.begin(fields([0.5; 3], ActionSet::ALL));
+        agent.end(1.0, Last::Terminated);
+    }
+    assert!(bits(&saved(&through)) == bits(&saved(&resumed)));
 }
 
 /// Where everything has diverged, that is what is kept.
