@@ -13,6 +13,7 @@
 //! | [`audit`] | exact shaping checks on models |
 //! | [`stats`] | IQM, intervals, rolling means |
 //! | [`learn`] | agents and planners |
+//! | [`nn`] | small networks and what trains them |
 //! | [`shaping`] | rewards, potentials, discretisers |
 //! | [`render`] | scenes as pixels, GIFs, characters |
 //! | [`mod@env`] | the environments and their registry |
