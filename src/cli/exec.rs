@@ -166,8 +166,10 @@ fn train(
         Err(ExecuteError::Script(d)) => Err(Failure::Script(d)),
         Err(ExecuteError::Store(e)) => Err(e.into()),
         Err(ExecuteError::Interrupted { done, total }) => {
+            let networks = plan.variants.iter().any(|v| v.agent.is_network());
+            let begun = if networks { "; networks under way are kept too" } else { "" };
             note(&format!(
-                "stopped: {done} of {total} units are stored in {}\nto go on: {}",
+                "stopped: {done} of {total} units are stored in {}{begun}\nto go on: {}",
                 results.folder.display(),
                 resume(args)
             ));

@@ -336,14 +336,16 @@ impl AgentConfig {
     }
 
     /// The parameters that play a part: ε does with ε-greedy behaviour only, which goes without
-    /// saying, and what is left out does not.
+    /// saying, what is left out does not, and priorities do with prioritised replay only.
     pub fn in_effect(&self) -> impl Iterator<Item = (&'static str, ParamValue)> {
         let unsaid = match self.exploration() {
             Exploration::EpsilonGreedy => "exploration",
             Exploration::Softmax { .. } | Exploration::Ucb { .. } => "epsilon",
         };
+        let uniform = self.params.get("prioritized_replay") == Some(&ParamValue::Bool(false));
         let plays = move |(name, value): &(&&'static str, &ParamValue)| {
-            **name != unsaid && **value != ParamValue::Word(ParamKind::NONE)
+            let idle = uniform && name.starts_with("prioritized_replay_");
+            **name != unsaid && **value != ParamValue::Word(ParamKind::NONE) && !idle
         };
         self.params.iter().filter(plays).map(|(k, v)| (*k, *v))
     }
