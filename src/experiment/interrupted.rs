@@ -114,7 +114,8 @@ impl<'a> SoFar<'a> {
     pub(super) fn write(&self, agent: &Dqn) -> Result<(), StoreError> {
         let Some(at) = self.at else { return Ok(()) };
         let steps: u64 = self.rows.iter().map(|row| u64::from(row.steps)).sum();
-        if steps != agent.steps() || steps == 0 {
+        // One that has diverged is not to be gone on with: it fails at the same step when run anew.
+        if steps != agent.steps() || steps == 0 || agent.failed_at().is_some() {
             return Ok(());
         }
         let mut snapshot = Snapshot::default();

@@ -152,6 +152,13 @@ where
 {
     let mut starts = limits.exploring_starts.and_then(|seed| Starts::new(&world.env, seed));
     let mut returns = past.to_vec();
+    let solved = |returns: &[f64]| {
+        limits.stop_when.is_some_and(|s| is_solved(returns, s.window, s.threshold))
+    };
+    // A crash may have come between the episode that solved the task and its being stored.
+    if solved(&returns) {
+        return Ok(());
+    }
     for episode in past.len() as u32..limits.episodes {
         if stop.load(Ordering::Relaxed) {
             return Err(TrainError::Interrupted);
@@ -165,11 +172,9 @@ where
                 if let Some(step) = agent.dqn().and_then(Dqn::failed_at) {
                     return Err(TrainError::Diverged { episode, step });
                 }
-                if let Some(Solved { threshold, window }) = limits.stop_when {
-                    returns.push(native);
-                    if is_solved(&returns, window, threshold) {
-                        break;
-                    }
+                returns.push(native);
+                if solved(&returns) {
+                    break;
                 }
             }
             Err((None, _)) => return Err(TrainError::Interrupted),

@@ -114,6 +114,35 @@ fn a_network_that_is_trained_further_ends_in_the_same_bytes() {
     assert_eq!(contents(&parts), contents(&whole));
 }
 
+/// A crash may come after the episode that solved the task was written down and before the unit was
+/// stored: nothing is played beyond it.
+#[test]
+fn what_was_solved_before_the_crash_is_not_gone_on_with() {
+    let plan = plan_of(SCRIPT, &[]);
+    let unit = &units(&plan)[0];
+    let dir = folder();
+    let store = Store::open(dir.path()).unwrap();
+    until(&plan, unit, &store, 20);
+    // The same unit, had it been asked to stop at what the last five episodes reached at least.
+    let stops = |threshold| {
+        let mut stopping = plan.clone();
+        stopping.variants[0].stop_when_solved = true;
+        stopping.variants[0].threshold = Some(threshold);
+        to_the_end(&stopping, unit, &store)
+    };
+    let bytes = partial(dir.path()).unwrap();
+    let (record, now) = stops(1.0);
+    assert_eq!(
+        (record.rows.len(), now),
+        (20, 0),
+        "an episode of CartPole has a return of 1 or more"
+    );
+    store.remove(unit).unwrap();
+    std::fs::write(store.path(unit).with_extension("partial"), bytes).unwrap();
+    let (record, now) = stops(1e6);
+    assert_eq!((record.rows.len(), now), (40, 20), "nobody reaches that");
+}
+
 /// A file that is damaged, or another unit's, costs time and nothing else.
 #[test]
 fn what_is_not_whole_is_not_gone_on_with() {
