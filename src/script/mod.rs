@@ -19,6 +19,7 @@ mod freeze;
 pub mod functions;
 mod host;
 pub mod keys;
+mod lower;
 mod network;
 mod numeric;
 mod params;
