@@ -18,7 +18,7 @@ impl Lowering<'_> {
             return outside("a function that sees its caller's variables", position);
         }
         let name = call.name.as_str();
-        let args = self.in_order(call.args.iter())?;
+        let args = self.args(call)?;
         for arg in &args {
             if let Val::Mixed(what) = arg {
                 return outside(*what, position);
@@ -31,6 +31,19 @@ impl Lowering<'_> {
             return outside(format!("`{name}` with another number of arguments"), position);
         }
         self.builtin(name, &args, position)
+    }
+
+    /// The arguments of a call. A variable in the first place is read after the others are evaluated:
+    /// Rhai hands it over as a reference.
+    fn args(&mut self, call: &FnCallExpr) -> Lowered<Vec<Val>> {
+        match call.args.split_first() {
+            Some((first @ Expr::Variable(..), rest)) => {
+                let mut args = self.in_order(rest.iter().chain(std::iter::once(first)))?;
+                args.rotate_right(1);
+                Ok(args)
+            }
+            _ => self.in_order(call.args.iter()),
+        }
     }
 
     /// Binds the parameters of `function`, which is begun.
@@ -148,7 +161,7 @@ impl Lowering<'_> {
             let val = self.call(call, position)?;
             return self.emit_return(val, position);
         }
-        let args = self.in_order(call.args.iter())?;
+        let args = self.args(call)?;
         if args.iter().any(|v| matches!(v, Val::Never)) {
             return Ok(());
         }

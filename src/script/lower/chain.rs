@@ -6,10 +6,11 @@ use rhai::{ASTFlags, BinaryExpr, Expr, FnCallExpr, Position};
 
 use super::expr::is_optional;
 use super::value::Val;
-use super::{Lowered, Lowering, StepInputs, outside};
+use super::{Lowered, Lowering, outside};
 use crate::jit::ir::{self, Binary, Compare, Stmt, Type};
 use crate::mdp::FieldKind;
 use crate::script::value::Value;
+use crate::shaping::StepLayout;
 
 /// One link of a chain.
 enum Link<'e> {
@@ -122,7 +123,7 @@ impl Lowering<'_> {
     }
 
     fn step_field(&mut self, name: &str, position: Position) -> Lowered<Val> {
-        let at = StepInputs::new(self.schema.fields.len());
+        let at = StepLayout::new(self.schema.fields.len());
         let input = |i, ty| Ok(Val::Num(ir::Expr::Input(i, ty)));
         match name {
             "state" => Ok(Val::State(at.state)),
@@ -131,10 +132,7 @@ impl Lowering<'_> {
             "reward" => input(at.reward, Type::Float),
             "terminated" => input(at.terminated, Type::Bool),
             "truncated" => input(at.truncated, Type::Bool),
-            "step" => {
-                self.reads_step = true;
-                input(at.step, Type::Int)
-            }
+            "step" => input(at.step, Type::Int),
             _ => outside(format!("the unknown field `{name}`"), position),
         }
     }
@@ -207,7 +205,12 @@ impl Lowering<'_> {
     }
 
     /// An element or a row of a table.
-    pub(super) fn slice_index(&mut self, val: &Val, index: ir::Expr, position: Position) -> Lowered<Val> {
+    pub(super) fn slice_index(
+        &mut self,
+        val: &Val,
+        index: ir::Expr,
+        position: Position,
+    ) -> Lowered<Val> {
         let Val::Slice { table, dims, offset } = val else {
             return outside(val.described(), position);
         };

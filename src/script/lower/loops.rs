@@ -171,6 +171,11 @@ impl Lowering<'_> {
         position: Position,
     ) -> Lowered<Val> {
         let over = self.over(&x.expr)?;
+        // The elements of an array that is a constant are constants themselves.
+        let is_range = matches!(over, Over::Range { .. });
+        if !is_range && self.frames.last().is_some_and(|f| f.assigned.contains(name.as_str())) {
+            return outside(format!("an assignment to `{}`", name.as_str()), name.pos);
+        }
         let exit = self.label();
         let n_bindings = self.scope.len();
         let (code, ()) = self.nested(|l| {

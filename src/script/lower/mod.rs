@@ -18,6 +18,8 @@ mod function;
 mod loops;
 mod stmt;
 mod switch;
+#[cfg(test)]
+mod tests;
 mod value;
 
 use std::collections::BTreeMap;
@@ -53,39 +55,10 @@ fn outside<T>(what: impl Into<String>, position: Position) -> Lowered<T> {
 pub(super) enum Param {
     /// A state, whose fields are the inputs from this one on.
     State(usize),
-    /// A step: see [`StepInputs`].
+    /// A step: its parts are the inputs of [`crate::shaping::StepLayout`].
     Step,
     /// An integer input.
     Int(usize),
-}
-
-/// Where a step's parts are among the inputs, for states of `n` fields.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct StepInputs {
-    pub(super) state: usize,
-    pub(super) next_state: usize,
-    pub(super) action: usize,
-    pub(super) reward: usize,
-    pub(super) terminated: usize,
-    pub(super) truncated: usize,
-    pub(super) step: usize,
-    /// How many inputs there are.
-    pub(super) len: usize,
-}
-
-impl StepInputs {
-    pub(super) fn new(n: usize) -> Self {
-        Self {
-            state: 0,
-            next_state: n,
-            action: 2 * n,
-            reward: 2 * n + 1,
-            terminated: 2 * n + 2,
-            truncated: 2 * n + 3,
-            step: 2 * n + 4,
-            len: 2 * n + 5,
-        }
-    }
 }
 
 /// What a callback must return.
@@ -136,7 +109,7 @@ pub(super) fn lower(
     constants: &BTreeMap<String, Value>,
     schema: &Schema,
 ) -> Lowered<Program> {
-    let mut lowering = Lowering {
+    let lowering = Lowering {
         functions,
         constants,
         schema,
@@ -156,7 +129,6 @@ pub(super) fn lower(
         frames: Vec::new(),
         loops: Vec::new(),
         cost: 0,
-        reads_step: false,
     };
     lowering.root(subject)
 }
@@ -206,7 +178,6 @@ struct Lowering<'a> {
     /// A bound on the operations that the interpreter counts for what is lowered so far, every loop's
     /// body once.
     cost: u64,
-    reads_step: bool,
 }
 
 /// Operations that the interpreter counts at most for a node of the syntax tree.
