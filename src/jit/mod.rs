@@ -2,9 +2,23 @@
 //! code made from it while the program runs.
 //!
 //! - [`Program`]: a pure function of floats, in the intermediate form ([`ir`])
+//! - [`Program::check`]: whether it is well formed
+//! - [`Program::evaluate`]: runs it as it stands
+//! - [`Kernel`]: runs it as fast as this host can, as machine code if there is any
 //! - [`math`]: the mathematical functions that programs call
 
+mod check;
+mod eval;
 pub mod ir;
+mod kernel;
+#[cfg(feature = "jit")]
+mod machine;
 pub mod math;
 
+#[cfg(test)]
+mod tests;
+
+pub use check::Invalid;
+pub use eval::Value;
 pub use ir::Program;
+pub use kernel::{Kernel, Output};
