@@ -74,17 +74,19 @@ impl Callbacks {
             Ok(program) => program,
             Err(reason) => return Tier::Interpreted(reason),
         };
-        let step = StepLayout::new(schema.fields.len()).step;
-        match role {
+        let reads_step =
+            role == Role::OfStep && program.reads(StepLayout::new(schema.fields.len()).step);
+        let tier = match role {
             Role::Cells(_) | Role::Shield | Role::Policy => {
-                Tier::Integer(Arc::new(Kernel::<i64>::new(program)))
+                Kernel::new(program).map(|kernel| Tier::Integer(Arc::new(kernel)))
             }
-            Role::OfStep => {
-                let reads_step = program.reads(step);
-                Tier::Number(Arc::new(Kernel::<f64>::new(program)), reads_step)
+            Role::OfStep | Role::Potential | Role::OfAction => {
+                Kernel::new(program).map(|kernel| Tier::Number(Arc::new(kernel), reads_step))
             }
-            Role::Potential | Role::OfAction => Tier::Number(Arc::new(Kernel::<f64>::new(program)), false),
-        }
+        };
+        tier.unwrap_or_else(|invalid| {
+            Tier::Interpreted(Reason { what: invalid.to_string(), place: None })
+        })
     }
 
     /// `callback` in the intermediate form.

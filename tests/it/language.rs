@@ -28,8 +28,9 @@ fn phi_at(plan: &Plan, variant: usize, row: u8, col: u8) -> f64 {
     let schema = variant.environment().unwrap().schema();
     let mut phi = host.callbacks().potential(potential(variant), &schema);
     let (row, col) = (f64::from(row), f64::from(col));
-    let first =
-        phi.at(&[row, col, 4.0 * row + col, f64::from(b'F')], 1).unwrap_or_else(|e| panic!("{e:?}"));
+    let first = phi
+        .at(&[row, col, 4.0 * row + col, f64::from(b'F')], 1)
+        .unwrap_or_else(|e| panic!("{e:?}"));
     let again = phi.at(&[row, col, 4.0 * row + col, f64::from(b'F')], 1).unwrap();
     assert_eq!(first.to_bits(), again.to_bits(), "a callback keeps nothing from call to call");
     first

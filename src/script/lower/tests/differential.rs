@@ -7,14 +7,14 @@ use rhai::Dynamic;
 
 use super::super::{Functions, Outside, Param, Subject, Want, lower};
 use super::generator::{Generator, Ty};
-use crate::jit::{Kernel, Program, ir};
+use crate::jit::{Kernel, Program, Value, ir};
 use crate::mdp::{Field, Schema};
 use crate::script::callback::{Callbacks, Prepared, cell_index};
 use crate::script::diagnostic::Diagnostic;
 use crate::script::engine::{CALLBACK_OPERATIONS, Context, compile, engine};
 use crate::script::source::SourceSet;
 use crate::script::state::{State, StepView};
-use crate::script::value::Value;
+use crate::script::value::Value as Constant;
 use crate::shaping::StepLayout;
 
 /// States of two floats and an integer.
@@ -107,8 +107,8 @@ impl Bench {
         let mut scope = rhai::Scope::new();
         engine.run_ast_with_scope(&mut scope, &ast).unwrap();
         let constants = scope.iter().filter(|(_, is_constant, _)| *is_constant);
-        let constants: std::collections::BTreeMap<String, Value> = constants
-            .map(|(name, _, value)| (name.to_string(), Value::freeze(&value).unwrap()))
+        let constants: std::collections::BTreeMap<String, Constant> = constants
+            .map(|(name, _, value)| (name.to_string(), Constant::freeze(&value).unwrap()))
             .collect();
         let host = Callbacks::new(engine, ast, context.clone(), constants.clone());
         let function = |name: &str| host.function(name);
@@ -147,9 +147,8 @@ impl Bench {
     fn source(&self, name: &str) -> String {
         let helpers = format!("fn h{}_", name.trim_start_matches('p'));
         let functions = self.text.split_inclusive("\nfn ").map(|f| format!("fn {f}"));
-        let own = functions.filter(|f| {
-            f.starts_with(&format!("fn {name}(")) || f.starts_with(&helpers)
-        });
+        let own =
+            functions.filter(|f| f.starts_with(&format!("fn {name}(")) || f.starts_with(&helpers));
         let own: String = own.collect();
         if own.is_empty() { self.text.clone() } else { own }
     }
@@ -222,9 +221,9 @@ impl Bench {
 fn evaluate(program: &Program, inputs: &[f64]) -> Outcome {
     match program.evaluate(inputs) {
         None => Outcome::Error,
-        Some(ir::Value::Float(x)) => float(x),
-        Some(ir::Value::Int(x)) => Outcome::Int(x),
-        Some(ir::Value::Bool(x)) => Outcome::Bool(x),
+        Some(Value::Float(x)) => float(x),
+        Some(Value::Int(x)) => Outcome::Int(x),
+        Some(Value::Bool(x)) => Outcome::Bool(x),
     }
 }
 
@@ -237,8 +236,8 @@ enum Machine {
 impl Machine {
     fn new(program: &Program) -> Self {
         match program.result {
-            ir::Type::Float => Self::Float(Kernel::<f64>::new(program.clone())),
-            ty => Self::Int(Kernel::<i64>::new(program.clone()), ty == ir::Type::Bool),
+            ir::Type::Float => Self::Float(Kernel::new(program.clone()).unwrap()),
+            ty => Self::Int(Kernel::new(program.clone()).unwrap(), ty == ir::Type::Bool),
         }
     }
 

@@ -125,7 +125,7 @@ fn cells_and_flags() {
             let cell = bench.cell("p", &[2, 3], &step);
             let evaluated = program.evaluate(&step.inputs());
             let evaluated = evaluated.map(|v| match v {
-                crate::jit::ir::Value::Int(i) => i as usize,
+                crate::jit::Value::Int(i) => i as usize,
                 other => panic!("{other:?}"),
             });
             assert_eq!(evaluated, cell, "{body} on {step:?}");
