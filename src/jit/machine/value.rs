@@ -9,8 +9,11 @@ use crate::jit::ir::{Binary, Compare, Expr, Type, Unary};
 /// Operations that the second operand of a logical one may have to be evaluated always.
 const CHEAP: u32 = 6;
 
-/// Memory that nothing writes to: inputs and tables.
-const CONSTANT: MemFlagsData = MemFlagsData::trusted().with_readonly().with_can_move();
+/// Inputs: they are there whichever way is taken, and nothing writes to them.
+const INPUT: MemFlagsData = MemFlagsData::trusted().with_readonly().with_can_move();
+
+/// Elements of tables: reading one must stay behind the check of its index.
+const ELEMENT: MemFlagsData = MemFlagsData::trusted();
 
 /// About how many operations an expression is; `None` if it may trap, or calls.
 pub(super) fn cost(expr: &Expr) -> Option<u32> {
@@ -79,7 +82,7 @@ impl Build<'_> {
             Expr::Bool(x) => self.b.ins().iconst(types::I8, i64::from(*x)),
             Expr::Input(i, ty) => {
                 let offset = 8 * *i as i32;
-                let x = self.b.ins().load(types::F64, CONSTANT, self.inputs, offset);
+                let x = self.b.ins().load(types::F64, INPUT, self.inputs, offset);
                 match ty {
                     Type::Float => x,
                     Type::Int => self.b.ins().fcvt_to_sint_sat(types::I64, x),
@@ -118,7 +121,7 @@ impl Build<'_> {
                 let at = self.place(index, table.len());
                 let base = self.b.ins().iconst(types::I64, self.tables[*i]);
                 let address = self.b.ins().iadd(base, at);
-                self.b.ins().load(ty, CONSTANT, address, 0)
+                self.b.ins().load(ty, ELEMENT, address, 0)
             }
             Expr::Element(i, index) => {
                 let (ty, len) = self.program.arrays[*i];

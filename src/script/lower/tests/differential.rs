@@ -102,8 +102,7 @@ impl Bench {
     fn parse(text: &str) -> Result<Self, Diagnostic> {
         let context = Context::new(SourceSet::from_text("test.rhai", text));
         let engine = engine(&context);
-        let ast =
-            compile(&engine, &context, "test.rhai", text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let ast = compile(&engine, &context, "test.rhai", text)?;
         let mut scope = rhai::Scope::new();
         engine.run_ast_with_scope(&mut scope, &ast).unwrap();
         let constants = scope.iter().filter(|(_, is_constant, _)| *is_constant);
