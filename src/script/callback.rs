@@ -1,6 +1,6 @@
 //! Calling script functions while training.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -9,6 +9,7 @@ use rhai::{AST, CallFnOptions, Dynamic, Engine, FnPtr, Scope};
 use super::diagnostic::{Diagnostic, Place};
 use super::engine::{CALLBACK_OPERATIONS, Context};
 use super::errors::diagnostic;
+use super::lower::Library;
 use super::native::{Role, Tier};
 use super::params::show;
 use super::plan::Callback;
@@ -55,6 +56,8 @@ pub struct Callbacks {
     pub(super) context: Rc<Context>,
     /// The script's constants, which its functions see.
     pub(super) constants: BTreeMap<String, Value>,
+    /// Its functions and those of its modules, once a callback is to be lowered.
+    pub(super) library: OnceCell<Library>,
     scope: RefCell<Scope<'static>>,
 }
 
@@ -68,7 +71,8 @@ impl Callbacks {
         engine.set_max_operations(CALLBACK_OPERATIONS);
         context.operations.set(0);
         context.max_operations.set(CALLBACK_OPERATIONS);
-        Rc::new(Self { engine, ast, context, constants, scope: RefCell::new(Scope::new()) })
+        let (library, scope) = (OnceCell::new(), RefCell::new(Scope::new()));
+        Rc::new(Self { engine, ast, context, constants, library, scope })
     }
 
     /// The function called `name`, as a value.

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::callback::Callbacks;
 use super::diagnostic::Place;
-use super::lower::{self, Functions, Param, Subject, Want};
+use super::lower::{self, Library, Param, Subject, Want};
 use super::plan::{Callback, DiscretiserSpec, Variant};
 use crate::jit::{self, Kernel, Program};
 use crate::mdp::Schema;
@@ -115,10 +115,9 @@ impl Callbacks {
             n_inputs,
             want,
         };
-        let script = self.context.sources.borrow().script.clone();
-        let functions = Functions::new(&self.ast, &script.text);
-        lower::lower(&subject, &functions, &self.constants, schema).map_err(|outside| {
-            let place = self.context.place(None, outside.position);
+        let library = self.library.get_or_init(|| Library::new(&self.ast, &self.context));
+        lower::lower(&subject, library, &self.constants, schema).map_err(|outside| {
+            let place = self.context.place(outside.file.as_deref(), outside.position);
             Reason { what: outside.what, place }
         })
     }

@@ -11,9 +11,6 @@ use crate::jit::ir::{self, Stmt};
 impl Lowering<'_> {
     /// The value of a call.
     pub(super) fn call(&mut self, call: &FnCallExpr, position: Position) -> Lowered<Val> {
-        if call.is_qualified() {
-            return outside("a module's function", position);
-        }
         if call.capture_parent_scope {
             return outside("a function that sees its caller's variables", position);
         }
@@ -24,13 +21,31 @@ impl Lowering<'_> {
                 return outside(*what, position);
             }
         }
-        if call.op_token.is_none() && self.functions.contains(name, Some(args.len())) {
-            return self.inline(name, args, position);
+        if call.is_qualified() {
+            let file = self.module(call, position)?;
+            return self.inline(file, name, args, position);
         }
-        if call.op_token.is_none() && self.functions.contains(name, None) {
+        if call.op_token.is_none() && self.file().contains(name, Some(args.len())) {
+            return self.inline(self.file, name, args, position);
+        }
+        if call.op_token.is_none() && self.file().contains(name, None) {
             return outside(format!("`{name}` with another number of arguments"), position);
         }
         self.builtin(name, &args, position)
+    }
+
+    /// The file of a function called as `alias::name(…)`.
+    fn module(&self, call: &FnCallExpr, position: Position) -> Lowered<usize> {
+        let alias = match call.namespace.path.as_slice() {
+            [alias] => alias.as_str(),
+            _ => return outside("a module's module", position),
+        };
+        match self.file().aliases.get(alias) {
+            Some(&file) if self.library.file(file).is_public(&call.name, call.args.len()) => {
+                Ok(file)
+            }
+            _ => outside(format!("the module `{alias}`"), position),
+        }
     }
 
     /// The arguments of a call. A variable in the first place is read after the others are evaluated:
@@ -55,7 +70,9 @@ impl Lowering<'_> {
         returns: Option<Return>,
         position: Position,
     ) -> Lowered<()> {
-        if self.frames.iter().any(|f| f.name == name && f.n_params == args.len()) {
+        let file = self.file;
+        let is_same = |f: &Frame| f.file == file && f.name == name && f.n_params == args.len();
+        if self.frames.iter().any(is_same) {
             return outside("a function that calls itself", position);
         }
         if self.frames.len() == MAX_DEPTH {
@@ -68,6 +85,7 @@ impl Lowering<'_> {
         }
         self.scope = bindings;
         self.frames.push(Frame {
+            file,
             name: name.to_string(),
             n_params: function.params.len(),
             assigned: function.assigned.clone(),
@@ -106,9 +124,10 @@ impl Lowering<'_> {
         })
     }
 
-    /// The value of the script's function `name` for `args`.
+    /// The value of the function `name` of `file` for `args`.
     pub(super) fn inline(
         &mut self,
+        file: usize,
         name: &str,
         args: Vec<Val>,
         position: Position,
@@ -116,10 +135,11 @@ impl Lowering<'_> {
         if args.iter().any(|v| matches!(v, Val::Never)) {
             return Ok(Val::Never);
         }
-        let Some(function) = self.functions.get(name, args.len()) else {
+        let Some(function) = self.library.file(file).get(name, args.len()) else {
             return outside(format!("`{name}` with another number of arguments"), position);
         };
         self.count(position)?;
+        let outer_file = std::mem::replace(&mut self.file, file);
         let outer_scope = std::mem::take(&mut self.scope);
         let outer_loops = std::mem::take(&mut self.loops);
         let label = self.label();
@@ -150,14 +170,18 @@ impl Lowering<'_> {
         };
         self.scope = outer_scope;
         self.loops = outer_loops;
+        self.file = outer_file;
         Ok(result)
     }
 
     /// A call in the last place of a function: what it returns, its caller returns.
     pub(super) fn tail_call(&mut self, call: &FnCallExpr, position: Position) -> Lowered<()> {
         let name = call.name.as_str();
-        let inlined = call.op_token.is_none() && !call.is_qualified() && !call.capture_parent_scope;
-        if !inlined || !self.functions.contains(name, Some(call.args.len())) {
+        let file = if call.is_qualified() { self.module(call, position)? } else { self.file };
+        let is_function = call.op_token.is_none()
+            && !call.capture_parent_scope
+            && self.library.file(file).contains(name, Some(call.args.len()));
+        if !is_function {
             let val = self.call(call, position)?;
             return self.emit_return(val, position);
         }
@@ -165,9 +189,10 @@ impl Lowering<'_> {
         if args.iter().any(|v| matches!(v, Val::Never)) {
             return Ok(());
         }
-        let Some(function) = self.functions.get(name, args.len()) else {
+        let Some(function) = self.library.file(file).get(name, args.len()) else {
             return outside(format!("`{name}` called as a function"), position);
         };
+        let outer_file = std::mem::replace(&mut self.file, file);
         let outer_scope = std::mem::take(&mut self.scope);
         let outer_loops = std::mem::take(&mut self.loops);
         self.enter(name, &function, args, None, position)?;
@@ -175,6 +200,7 @@ impl Lowering<'_> {
         self.frames.pop();
         self.scope = outer_scope;
         self.loops = outer_loops;
+        self.file = outer_file;
         Ok(())
     }
 

@@ -248,7 +248,7 @@ impl Lowering<'_> {
         position: Position,
     ) -> Lowered<Val> {
         let name = call.name.as_str();
-        if self.functions.contains(name, Some(args.len())) {
+        if self.file().contains(name, Some(args.len())) {
             return outside(format!("`{name}` called as a method"), position);
         }
         let length = match (&val, name, args.len()) {
@@ -269,7 +269,8 @@ impl Lowering<'_> {
         {
             let mut all: Vec<Val> = captures.iter().map(Val::of).collect();
             all.extend(args);
-            return self.inline(name, all, position);
+            // A script's closures and functions: its modules' are called by their names.
+            return self.inline(0, name, all, position);
         }
         let mut all = vec![val];
         all.extend(args);

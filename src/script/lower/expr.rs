@@ -47,20 +47,37 @@ impl Lowering<'_> {
                 Slot::Fixed(val) => val.clone(),
             });
         }
-        if let Some(value) = self.constants.get(name) {
-            return Ok(Val::of(value));
+        if self.file == 0 {
+            if let Some(value) = self.constants.get(name) {
+                return Ok(Val::of(value));
+            }
+        } else if let Some(expr) = self.file().constant(name) {
+            return self.module_constant(&expr, position);
         }
         let built_in = match name {
             "PI" => std::f64::consts::PI,
             "E" => std::f64::consts::E,
             "INF" => f64::INFINITY,
-            _ if self.functions.contains(name, None) => {
+            _ if self.file == 0 && self.file().contains(name, None) => {
                 let function = Value::Fn { name: name.to_string(), captures: Vec::new() };
                 return Ok(Val::Data(Rc::new(function)));
             }
             _ => return outside(format!("the variable `{name}`"), position),
         };
         Ok(Val::Num(ir::Expr::Float(built_in)))
+    }
+
+    /// A constant of a module, if it is one that can be worked out here.
+    fn module_constant(&mut self, expr: &Expr, position: Position) -> Lowered<Val> {
+        let outer = std::mem::take(&mut self.scope);
+        let (code, val) = self.nested(|l| l.expr(expr))?;
+        self.scope = outer;
+        let is_known = match &val {
+            Val::Num(e) => matches!(e, ir::Expr::Float(_) | ir::Expr::Int(_) | ir::Expr::Bool(_)),
+            Val::Data(_) => true,
+            _ => false,
+        };
+        if is_known && code.is_empty() { Ok(val) } else { outside("a module's constant", position) }
     }
 
     /// The number that `expr` is.

@@ -127,7 +127,7 @@ impl Lowering<'_> {
             };
             let is_range = call.name == "range"
                 && !call.is_qualified()
-                && !self.functions.contains("range", Some(call.args.len()));
+                && !self.file().contains("range", Some(call.args.len()));
             if operator.is_some() || is_range {
                 self.count(position)?;
                 let vals = self.in_order(call.args.iter())?;

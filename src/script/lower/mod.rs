@@ -22,11 +22,14 @@ mod switch;
 mod tests;
 mod value;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+use std::sync::Arc;
 
 use rhai::Position;
 
-pub(super) use function::Functions;
+use function::File;
+pub(super) use function::Library;
 use value::{Binding, Val};
 
 use super::engine::CALLBACK_OPERATIONS;
@@ -42,12 +45,14 @@ pub(super) struct Outside {
     pub(super) what: String,
     /// Where.
     pub(super) position: Position,
+    /// In which file.
+    pub(super) file: Option<Arc<str>>,
 }
 
 type Lowered<T> = Result<T, Outside>;
 
 fn outside<T>(what: impl Into<String>, position: Position) -> Lowered<T> {
-    Err(Outside { what: what.into(), position })
+    Err(Outside { what: what.into(), position, file: None })
 }
 
 /// What the host hands to a callback after its captured values.
@@ -98,19 +103,20 @@ pub(super) struct Subject<'a> {
     pub(super) want: Want,
 }
 
-/// Lowers `subject`, a callback on states with this `schema`, in a script with these `functions` and
+/// Lowers `subject`, a callback on states with this `schema`, in a script with these functions and
 /// `constants`.
 ///
 /// # Errors
 /// If it lies outside the subset.
 pub(super) fn lower(
     subject: &Subject<'_>,
-    functions: &Functions<'_>,
+    library: &Library,
     constants: &BTreeMap<String, Value>,
     schema: &Schema,
 ) -> Lowered<Program> {
-    let lowering = Lowering {
-        functions,
+    let mut lowering = Lowering {
+        library,
+        file: 0,
         constants,
         schema,
         want: subject.want.clone(),
@@ -130,7 +136,10 @@ pub(super) fn lower(
         loops: Vec::new(),
         cost: 0,
     };
-    lowering.root(subject)
+    lowering.root(subject).map_err(|outside| Outside {
+        file: Some(library.file(lowering.file).name.clone()),
+        ..outside
+    })
 }
 
 /// Where an inlined function's `return` goes.
@@ -143,9 +152,10 @@ enum Return {
 
 /// A function being inlined.
 struct Frame {
+    file: usize,
     name: String,
     n_params: usize,
-    assigned: std::rc::Rc<std::collections::BTreeSet<String>>,
+    assigned: Rc<BTreeSet<String>>,
     /// How it returns; `None` as the one below does, for calls in the last place.
     returns: Option<Return>,
 }
@@ -162,7 +172,9 @@ struct Loop {
 
 /// The work in progress.
 struct Lowering<'a> {
-    functions: &'a Functions<'a>,
+    library: &'a Library,
+    /// The file of the innermost function.
+    file: usize,
     constants: &'a BTreeMap<String, Value>,
     schema: &'a Schema,
     want: Want,
@@ -192,9 +204,9 @@ const MAX_DEPTH: usize = 32;
 const MAX_LOCALS: usize = 400;
 
 impl Lowering<'_> {
-    fn root(mut self, subject: &Subject<'_>) -> Lowered<Program> {
+    fn root(&mut self, subject: &Subject<'_>) -> Lowered<Program> {
         let arity = subject.captures.len() + subject.params.len();
-        let Some(function) = self.functions.get(subject.function, arity) else {
+        let Some(function) = self.file().get(subject.function, arity) else {
             return outside("a function that is not the script's", Position::NONE);
         };
         let mut args: Vec<Val> = subject.captures.iter().map(Val::of).collect();
@@ -210,7 +222,12 @@ impl Lowering<'_> {
         let operations = CALLBACK_OPERATIONS as i64;
         self.program.fuel = operations - self.cost as i64;
         self.program.body = std::mem::take(&mut self.code);
-        Ok(self.program)
+        Ok(self.program.clone())
+    }
+
+    /// The file of the innermost function.
+    fn file(&self) -> Rc<File> {
+        self.library.file(self.file).clone()
     }
 
     /// Counts a node.

@@ -93,8 +93,8 @@ impl Lowering<'_> {
         let mut constants = Vec::new();
         let mut unknown = 0;
         for (hash, list) in &cases.cases {
-            match self.functions.cases.get(hash) {
-                Some(case) => constants.push((*case, list)),
+            match self.file().cases.get(hash).copied() {
+                Some(case) => constants.push((case, list)),
                 None => unknown += 1,
             }
         }

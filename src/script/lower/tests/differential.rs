@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use rhai::Dynamic;
 
-use super::super::{Functions, Outside, Param, Subject, Want, lower};
+use super::super::{Library, Outside, Param, Subject, Want, lower};
 use super::generator::{Generator, Ty};
 use crate::jit::{Kernel, Program, Value, ir};
 use crate::mdp::{Field, Schema};
@@ -125,8 +125,9 @@ impl Bench {
             n_inputs: StepLayout::new(3).len,
             want,
         };
-        let functions = Functions::new(&self.host.ast, &self.text);
-        lower(&subject, &functions, &self.host.constants, &self.schema)
+        let host = &self.host;
+        let library = host.library.get_or_init(|| Library::new(&host.ast, &host.context));
+        lower(&subject, library, &host.constants, &self.schema)
     }
 
     fn view(&self, step: &Step) -> Dynamic {
