@@ -2,12 +2,14 @@
 //!
 //! - [`Code`]: a program's machine code, which owns the memory it lies in
 //! - `build`: statements as blocks of Cranelift's form; `value`: expressions as its values
+//! - `range`: what is known of them
 //!
 //! The code has the host's calling convention and takes the address of its inputs. It returns a float,
 //! or an integer (a truth value is 0 or 1); a trap returns [`Output::TRAP`](super::Output).
 
 mod build;
 mod code;
+mod range;
 mod value;
 
 use std::fmt;
