@@ -10,12 +10,11 @@ use crate::jit::ir::{Binary, Compare, Expr, Type, Unary};
 /// Operations that the second operand of a logical one may have to be evaluated always.
 const CHEAP: u32 = 6;
 
-/// Memory of tables. Nothing writes to it.
-const TABLE: MemFlagsData = MemFlagsData::trusted().with_readonly();
+/// Inputs: they are there whichever way is taken, and nothing writes to them.
+const INPUT: MemFlagsData = MemFlagsData::trusted().with_readonly().with_can_move();
 
-/// Memory of the inputs. All of them may be read any time; of a table, an element may be read only
-/// after its index has been checked.
-const INPUT: MemFlagsData = TABLE.with_can_move();
+/// Elements of tables: reading one must stay behind the check of its index.
+const ELEMENT: MemFlagsData = MemFlagsData::trusted();
 
 /// About how many operations an expression is; `None` if it may trap, or calls.
 pub(super) fn cost(expr: &Expr) -> Option<u32> {
@@ -128,7 +127,7 @@ impl Build<'_> {
                 let at = self.place(index, table.len());
                 let base = self.b.ins().iconst(types::I64, self.tables[*i]);
                 let address = self.b.ins().iadd(base, at);
-                let value = self.b.ins().load(ty, TABLE, address, 0);
+                let value = self.b.ins().load(ty, ELEMENT, address, 0);
                 self.within(value, Range::of(table))
             }
             Expr::Element(i, index) => {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::jit::math;
 
-/// SplitMix64 (Steele, Lea & Flood 2014).
+/// `SplitMix64` (Steele, Lea & Flood 2014).
 struct Random(u64);
 
 impl Random {
@@ -185,10 +185,10 @@ impl Writer {
         if depth == 0 || self.random.below(6) == 0 {
             return self.leaf(ty, true);
         }
-        if self.random.below(6) == 0 {
-            if let Some(element) = self.element(ty, depth - 1) {
-                return element;
-            }
+        if self.random.below(6) == 0
+            && let Some(element) = self.element(ty, depth - 1)
+        {
+            return element;
         }
         let depth = depth - 1;
         match ty {
