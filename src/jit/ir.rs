@@ -235,6 +235,33 @@ pub struct Program {
 }
 
 impl Program {
+    /// Whether input `index` can have a part in what it returns.
+    pub fn reads(&self, index: usize) -> bool {
+        fn expr(e: &Expr, index: usize) -> bool {
+            match e {
+                Expr::Input(i, _) => *i == index,
+                Expr::Float(_) | Expr::Int(_) | Expr::Bool(_) | Expr::Local(_) => false,
+                Expr::Unary(_, x) | Expr::Call1(_, x) | Expr::Table(_, x) | Expr::Element(_, x) => {
+                    expr(x, index)
+                }
+                Expr::Binary(_, a, b) | Expr::And(a, b) | Expr::Or(a, b) | Expr::Call2(_, a, b) => {
+                    expr(a, index) || expr(b, index)
+                }
+            }
+        }
+        fn stmts(list: &[Stmt], index: usize) -> bool {
+            list.iter().any(|stmt| match stmt {
+                Stmt::Set(_, e) | Stmt::SetElement(_, _, e) | Stmt::Check(e) | Stmt::Return(e) => {
+                    expr(e, index)
+                }
+                Stmt::If(e, a, b) => expr(e, index) || stmts(a, index) || stmts(b, index),
+                Stmt::Block(_, list) | Stmt::Loop(_, list) => stmts(list, index),
+                Stmt::Exit(_) | Stmt::Again(..) | Stmt::Trap => false,
+            })
+        }
+        stmts(&self.body, index)
+    }
+
     /// The type of an expression in it.
     pub fn type_of(&self, expr: &Expr) -> Type {
         match expr {

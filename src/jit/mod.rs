@@ -22,3 +22,17 @@ pub use check::Invalid;
 pub use eval::Value;
 pub use ir::Program;
 pub use kernel::{Kernel, Output};
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static DISABLED: AtomicBool = AtomicBool::new(false);
+
+/// Leaves all callbacks of this process to the interpreter from now on.
+pub fn disable() {
+    DISABLED.store(true, Ordering::Relaxed);
+}
+
+/// Whether callbacks may be run as programs: [`disable`] has not been called.
+pub fn is_enabled() -> bool {
+    !DISABLED.load(Ordering::Relaxed)
+}
