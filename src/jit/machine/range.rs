@@ -7,7 +7,7 @@
 use cranelift_codegen::entity::SecondaryMap;
 use cranelift_codegen::ir::Value;
 
-use crate::jit::ir::{Binary, Table, Unary};
+use crate::jit::ir::{Binary, Compare, Table, Unary};
 
 /// What is known of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -129,6 +129,19 @@ impl Range {
         }
     }
 
+    /// Whether integers of two ranges compare so, if all do or none.
+    pub(super) fn decides(self, how: Compare, other: Self) -> Option<bool> {
+        let ((a, b), (c, d)) = (self.int(), other.int());
+        let decided = match how {
+            Compare::Lt | Compare::Ge if b < c => true,
+            Compare::Lt | Compare::Ge if a >= d => false,
+            Compare::Le | Compare::Gt if b <= c => true,
+            Compare::Le | Compare::Gt if a > d => false,
+            _ => return None,
+        };
+        Some(decided == matches!(how, Compare::Lt | Compare::Le))
+    }
+
     /// The second if it is beyond the first, else the first; so too if one of them is NaN.
     fn preferred(self, op: Binary, other: Self) -> Self {
         let ((a, b, nan), (c, d, other_nan)) = (self.float(), other.float());
@@ -139,3 +152,6 @@ impl Range {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

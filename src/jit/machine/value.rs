@@ -252,6 +252,9 @@ impl Build<'_> {
             Binary::OrInt | Binary::OrBool => self.b.ins().bor(x, y),
             Binary::XorInt | Binary::XorBool => self.b.ins().bxor(x, y),
             Binary::Float(how) => self.b.ins().fcmp(ordered(how), x, y),
+            Binary::Int(how) if let Some(holds) = self.ranges[x].decides(how, self.ranges[y]) => {
+                self.b.ins().iconst(types::I8, i64::from(holds))
+            }
             Binary::Int(how) | Binary::Bool(how) => self.b.ins().icmp(signed(how), x, y),
         };
         self.within(value, range)

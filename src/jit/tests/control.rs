@@ -270,6 +270,33 @@ fn an_index_known_to_be_inside_is_inside() {
     }
 }
 
+/// Integers of which it is known how they compare, and of which it is nearly known.
+#[test]
+fn comparisons_of_bounded_integers() {
+    let orders: [(Compare, fn(i64, i64) -> bool); 6] = [
+        (Compare::Eq, |x, y| x == y),
+        (Compare::Ne, |x, y| x != y),
+        (Compare::Lt, |x, y| x < y),
+        (Compare::Le, |x, y| x <= y),
+        (Compare::Gt, |x, y| x > y),
+        (Compare::Ge, |x, y| x >= y),
+    ];
+    for (lo, hi) in [(0, 0), (-2, 3), (0, 3)] {
+        let x = binary(Binary::MaxInt, Expr::Input(0, Type::Int), Expr::Int(lo));
+        let x = binary(Binary::MinInt, x, Expr::Int(hi));
+        for y in -3..5 {
+            for (how, right) in orders {
+                let value = binary(Binary::Int(how), x.clone(), Expr::Int(y));
+                let code = Tiers::new(&program(1, Type::Bool, vec![Stmt::Return(value)]));
+                for input in -4..5_i64 {
+                    let right = right(input.clamp(lo, hi), y);
+                    expect(&code, &[input as f64], Some(Value::Bool(right)));
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn what_is_not_evaluated_does_not_trap() {
     let one = |x| binary(Binary::DivInt, Expr::Int(1), x);
