@@ -270,10 +270,13 @@ fn an_index_known_to_be_inside_is_inside() {
     }
 }
 
+/// How two integers compare.
+type Order = fn(i64, i64) -> bool;
+
 /// Integers of which it is known how they compare, and of which it is nearly known.
 #[test]
 fn comparisons_of_bounded_integers() {
-    let orders: [(Compare, fn(i64, i64) -> bool); 6] = [
+    let orders: [(Compare, Order); 6] = [
         (Compare::Eq, |x, y| x == y),
         (Compare::Ne, |x, y| x != y),
         (Compare::Lt, |x, y| x < y),
