@@ -8,6 +8,7 @@ use cranelift_codegen::ir::{
 use cranelift_codegen::isa::TargetFrontendConfig;
 use cranelift_frontend::{FunctionBuilder, Variable};
 
+use super::range::Ranges;
 use crate::jit::ir::{Expr, Label, Program, Stmt, Type, Unary};
 
 /// Operations that two branches may have together to be evaluated both. A mispredicted branch costs
@@ -35,6 +36,8 @@ pub(super) struct Build<'a> {
     labels: Vec<(Label, Block)>,
     /// The signatures of functions of one float, and of two.
     pub(super) calls: [SigRef; 2],
+    /// What is known of values.
+    pub(super) ranges: Ranges,
 }
 
 /// The body of the function of a checked program, whose tables begin at the address `constants`.
@@ -72,8 +75,9 @@ pub(super) fn function(
         signature.returns.push(AbiParam::new(types::F64));
         b.import_signature(signature)
     });
-    let labels = Vec::new();
-    let mut build = Build { program, b, locals, arrays, tables, inputs, fuel, trap, labels, calls };
+    let (labels, ranges) = (Vec::new(), Ranges::new());
+    let mut build =
+        Build { program, b, locals, arrays, tables, inputs, fuel, trap, labels, calls, ranges };
     if build.list(&program.body) {
         build.b.ins().jump(trap, &[]);
     }

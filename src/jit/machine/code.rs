@@ -29,7 +29,7 @@ pub(in crate::jit) struct Code<R> {
     entry: unsafe extern "C" fn(*const f64) -> R,
     n_inputs: usize,
     /// What the code lies in; taken when it is freed. Never locked: it makes this `Sync`.
-    module: Mutex<Option<JITModule>>,
+    module: Mutex<Option<Box<JITModule>>>,
     /// What its tables lie in.
     _constants: Box<[u64]>,
 }
@@ -50,7 +50,7 @@ impl<R: Output> Code<R> {
         let entry = unsafe {
             std::mem::transmute::<*const u8, unsafe extern "C" fn(*const f64) -> R>(entry)
         };
-        let module = Mutex::new(Some(module));
+        let module = Mutex::new(Some(Box::new(module)));
         Ok(Self { entry, n_inputs: program.n_inputs, module, _constants: constants })
     }
 

@@ -2,12 +2,14 @@
 //!
 //! - [`Code`]: a program's machine code, which owns the memory it lies in
 //! - `build`: statements as blocks of Cranelift's form; `value`: expressions as its values
+//! - `range`: what is known of them
 //!
 //! The code has the host's calling convention and takes the address of its inputs. It returns a float,
 //! or an integer (a truth value is 0 or 1); a trap returns [`Output::TRAP`](super::Output).
 
 mod build;
 mod code;
+mod range;
 mod value;
 
 use std::fmt;
@@ -137,14 +139,13 @@ fn module(program: &Program, constants: i64) -> Result<(JITModule, FuncId), Erro
     Ok((module, id))
 }
 
-/// A program in Cranelift's form and in machine code, to be looked at.
-#[cfg(test)]
+/// The machine code of a program, to be looked at.
+#[cfg(all(test, target_arch = "x86_64"))]
 pub(super) fn listing(program: &Program) -> String {
     let isa = host().unwrap();
     let mut context = function(program, 0, &*isa).unwrap();
-    let before = context.func.display().to_string();
     context.set_disasm(true);
-    let code =
-        context.compile(&*isa, &mut cranelift_codegen::control::ControlPlane::default()).unwrap();
-    format!("{before}\n{}", code.vcode.as_ref().unwrap())
+    let mut plane = cranelift_codegen::control::ControlPlane::default();
+    let code = context.compile(&*isa, &mut plane).unwrap();
+    code.vcode.clone().unwrap()
 }

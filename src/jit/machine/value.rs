@@ -1,9 +1,10 @@
 //! Expressions as Cranelift's values.
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
-use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
+use cranelift_codegen::ir::{InstBuilder, InstructionData, MemFlagsData, Value, types};
 
 use super::build::{Build, FRAME, machine_type};
+use super::range::Range;
 use crate::jit::ir::{Binary, Compare, Expr, Type, Unary};
 
 /// Operations that the second operand of a logical one may have to be evaluated always.
@@ -74,11 +75,20 @@ impl Build<'_> {
         cost(expr).is_some_and(|cost| cost <= CHEAP)
     }
 
+    /// `value`, of which that much is known.
+    fn within(&mut self, value: Value, range: Range) -> Value {
+        self.ranges[value] = range;
+        value
+    }
+
     /// The value of an expression in the current block.
     pub(super) fn value(&mut self, expr: &Expr) -> Value {
         match expr {
-            Expr::Float(x) => self.b.ins().f64const(*x),
-            Expr::Int(x) => self.b.ins().iconst(types::I64, *x),
+            Expr::Float(x) => {
+                let value = self.b.ins().f64const(*x);
+                self.within(value, Range::constant(*x))
+            }
+            Expr::Int(x) => self.int(*x),
             Expr::Bool(x) => self.b.ins().iconst(types::I8, i64::from(*x)),
             Expr::Input(i, ty) => {
                 let offset = 8 * *i as i32;
@@ -98,12 +108,8 @@ impl Build<'_> {
                 self.unary(*op, x)
             }
             Expr::Binary(op, x, y) => {
-                let divisor = match **y {
-                    Expr::Int(y) => Some(y),
-                    _ => None,
-                };
                 let (x, y) = (self.value(x), self.value(y));
-                self.binary(*op, x, y, divisor)
+                self.binary(*op, x, y)
             }
             Expr::And(x, y) => self.logical(x, y, true),
             Expr::Or(x, y) => self.logical(x, y, false),
@@ -121,7 +127,8 @@ impl Build<'_> {
                 let at = self.place(index, table.len());
                 let base = self.b.ins().iconst(types::I64, self.tables[*i]);
                 let address = self.b.ins().iadd(base, at);
-                self.b.ins().load(ty, ELEMENT, address, 0)
+                let value = self.b.ins().load(ty, ELEMENT, address, 0);
+                self.within(value, Range::of(table))
             }
             Expr::Element(i, index) => {
                 let (ty, len) = self.program.arrays[*i];
@@ -131,6 +138,11 @@ impl Build<'_> {
                 self.b.ins().load(machine_type(ty), FRAME, address, 0)
             }
         }
+    }
+
+    fn int(&mut self, x: i64) -> Value {
+        let value = self.b.ins().iconst(types::I64, x);
+        self.within(value, Range::Int(x, x))
     }
 
     /// Traps if `fails` holds.
@@ -144,22 +156,34 @@ impl Build<'_> {
     pub(super) fn select(&mut self, condition: Value, one: Value, other: Value) -> Value {
         // For a float, Cranelift jumps on x86-64; for an integer it moves conditionally.
         if cfg!(target_arch = "x86_64") && self.b.func.dfg.value_type(one) == types::F64 {
-            let bits = MemFlagsData::new();
-            let one = self.b.ins().bitcast(types::I64, bits, one);
-            let other = self.b.ins().bitcast(types::I64, bits, other);
+            let (one, other) = (self.bits(one), self.bits(other));
             let chosen = self.b.ins().select(condition, one, other);
-            return self.b.ins().bitcast(types::F64, bits, chosen);
+            return self.b.ins().bitcast(types::F64, MemFlagsData::new(), chosen);
         }
         self.b.ins().select(condition, one, other)
     }
 
+    /// The bits of a float.
+    fn bits(&mut self, x: Value) -> Value {
+        let dfg = &self.b.func.dfg;
+        if let Some(inst) = dfg.value_def(x).inst()
+            && let InstructionData::UnaryIeee64 { imm, .. } = dfg.insts[inst]
+        {
+            return self.b.ins().iconst(types::I64, imm.bits() as i64);
+        }
+        self.b.ins().bitcast(types::I64, MemFlagsData::new(), x)
+    }
+
     fn unary(&mut self, op: Unary, x: Value) -> Value {
-        match op {
+        let range = self.ranges[x];
+        let value = match op {
             Unary::NegFloat => self.b.ins().fneg(x),
             Unary::AbsFloat => self.b.ins().fabs(x),
             Unary::NegInt | Unary::AbsInt => {
-                let least = self.b.ins().icmp_imm_s(IntCC::Equal, x, i64::MIN);
-                self.trap_if(least);
+                if range.int().0 == i64::MIN {
+                    let least = self.b.ins().icmp_imm_s(IntCC::Equal, x, i64::MIN);
+                    self.trap_if(least);
+                }
                 if op == Unary::NegInt { self.b.ins().ineg(x) } else { self.b.ins().iabs(x) }
             }
             Unary::Not => self.b.ins().bxor_imm_u(x, 1),
@@ -176,12 +200,13 @@ impl Build<'_> {
                 let infinity = self.b.ins().f64const(f64::INFINITY);
                 self.b.ins().fcmp(how, size, infinity)
             }
-        }
+        };
+        self.within(value, range.unary(op))
     }
 
-    /// `constant` is the second operand if that is a constant integer.
-    fn binary(&mut self, op: Binary, x: Value, y: Value, constant: Option<i64>) -> Value {
-        match op {
+    fn binary(&mut self, op: Binary, x: Value, y: Value) -> Value {
+        let (range, exact) = self.ranges[x].binary(op, self.ranges[y]);
+        let value = match op {
             Binary::AddFloat => self.b.ins().fadd(x, y),
             Binary::SubFloat => self.b.ins().fsub(x, y),
             Binary::MulFloat => self.b.ins().fmul(x, y),
@@ -195,6 +220,9 @@ impl Build<'_> {
                 let less = self.b.ins().fcmp(FloatCC::LessThan, x, y);
                 self.b.ins().select(less, y, x)
             }
+            Binary::AddInt if exact => self.b.ins().iadd(x, y),
+            Binary::SubInt if exact => self.b.ins().isub(x, y),
+            Binary::MulInt if exact => self.b.ins().imul(x, y),
             Binary::AddInt | Binary::SubInt | Binary::MulInt => {
                 let (value, overflow) = match op {
                     Binary::AddInt => self.b.ins().sadd_overflow(x, y),
@@ -205,11 +233,12 @@ impl Build<'_> {
                 value
             }
             Binary::DivInt | Binary::RemInt => {
-                if matches!(constant, None | Some(0)) {
+                let (least, (lo, hi)) = (self.ranges[x].int().0, self.ranges[y].int());
+                if lo <= 0 && hi >= 0 {
                     let zero = self.b.ins().icmp_imm_s(IntCC::Equal, y, 0);
                     self.trap_if(zero);
                 }
-                if matches!(constant, None | Some(-1)) {
+                if least == i64::MIN && lo <= -1 && hi >= -1 {
                     let least = self.b.ins().icmp_imm_s(IntCC::Equal, x, i64::MIN);
                     let minus_one = self.b.ins().icmp_imm_s(IntCC::Equal, y, -1);
                     let overflow = self.b.ins().band(least, minus_one);
@@ -223,8 +252,12 @@ impl Build<'_> {
             Binary::OrInt | Binary::OrBool => self.b.ins().bor(x, y),
             Binary::XorInt | Binary::XorBool => self.b.ins().bxor(x, y),
             Binary::Float(how) => self.b.ins().fcmp(ordered(how), x, y),
+            Binary::Int(how) if let Some(holds) = self.ranges[x].decides(how, self.ranges[y]) => {
+                self.b.ins().iconst(types::I8, i64::from(holds))
+            }
             Binary::Int(how) | Binary::Bool(how) => self.b.ins().icmp(signed(how), x, y),
-        }
+        };
+        self.within(value, range)
     }
 
     /// Both hold (`and`), or one; the second is evaluated only if it decides, unless that is cheap.
@@ -261,21 +294,18 @@ impl Build<'_> {
     /// The offset in bytes of an element among `len`; traps outside.
     fn place(&mut self, index: &Expr, len: usize) -> Value {
         let len = len as i64;
-        let at = match index {
-            // Wrapping cannot bring an index inside: only the negative ones above -len end there.
-            Expr::Int(i) if (-len..len).contains(i) => {
-                let at = if *i < 0 { i + len } else { *i };
-                return self.b.ins().iconst(types::I64, 8 * at);
-            }
-            _ => {
-                let index = self.value(index);
-                let sign = self.b.ins().sshr_imm_u(index, 63);
-                let from_end = self.b.ins().band_imm_s(sign, len);
-                self.b.ins().iadd(index, from_end)
-            }
-        };
-        let outside = self.b.ins().icmp_imm_s(IntCC::UnsignedGreaterThanOrEqual, at, len);
-        self.trap_if(outside);
+        let mut at = self.value(index);
+        let (lo, hi) = self.ranges[at].int();
+        if lo < 0 {
+            // Wrapping cannot bring an index inside: only the negative ones from -len end there.
+            let sign = self.b.ins().sshr_imm_u(at, 63);
+            let from_end = self.b.ins().band_imm_s(sign, len);
+            at = self.b.ins().iadd(at, from_end);
+        }
+        if lo < -len || hi >= len {
+            let outside = self.b.ins().icmp_imm_s(IntCC::UnsignedGreaterThanOrEqual, at, len);
+            self.trap_if(outside);
+        }
         self.b.ins().ishl_imm_u(at, 3)
     }
 }

@@ -1,6 +1,8 @@
 //! Programs built by hand and at random, evaluated and as machine code, against Rust.
 
 mod control;
+mod indices;
+#[cfg(all(feature = "jit", target_arch = "x86_64"))]
 mod listing;
 mod memory;
 mod operations;

@@ -2,6 +2,13 @@
 
 use super::*;
 
+/// What is right, of one or two operands; without a value it traps.
+type OfFloat = fn(f64) -> Value;
+type OfFloats = fn(f64, f64) -> Value;
+type OfInt = fn(i64) -> Option<Value>;
+type OfInts = fn(i64, i64) -> Option<Value>;
+type OfFlags = fn(bool, bool) -> bool;
+
 /// Whether the operands are inputs or constants, which are compiled differently.
 #[derive(Clone, Copy)]
 enum From {
@@ -42,7 +49,7 @@ fn returned(n_inputs: usize, value: Expr) -> Tiers {
 
 #[test]
 fn of_one_float() {
-    let operations: [(Unary, fn(f64) -> Value); 10] = [
+    let operations: [(Unary, OfFloat); 10] = [
         (Unary::NegFloat, |x| Value::Float(-x)),
         (Unary::AbsFloat, |x| Value::Float(x.abs())),
         (Unary::FloatToInt, |x| Value::Int(x as i64)),
@@ -65,7 +72,7 @@ fn of_one_float() {
 
 #[test]
 fn of_two_floats() {
-    let operations: [(Binary, fn(f64, f64) -> Value); 12] = [
+    let operations: [(Binary, OfFloats); 12] = [
         (Binary::AddFloat, |x, y| Value::Float(x + y)),
         (Binary::SubFloat, |x, y| Value::Float(x - y)),
         (Binary::MulFloat, |x, y| Value::Float(x * y)),
@@ -104,7 +111,7 @@ fn the_least_and_the_greatest_prefer_the_first() {
 
 #[test]
 fn of_one_integer() {
-    let operations: [(Unary, fn(i64) -> Option<Value>); 3] = [
+    let operations: [(Unary, OfInt); 3] = [
         (Unary::NegInt, |x| x.checked_neg().map(Value::Int)),
         (Unary::AbsInt, |x| x.checked_abs().map(Value::Int)),
         (Unary::IntToFloat, |x| Some(Value::Float(x as f64))),
@@ -121,7 +128,7 @@ fn of_one_integer() {
 
 #[test]
 fn of_two_integers() {
-    let operations: [(Binary, fn(i64, i64) -> Option<Value>); 16] = [
+    let operations: [(Binary, OfInts); 16] = [
         (Binary::AddInt, |x, y| x.checked_add(y).map(Value::Int)),
         (Binary::SubInt, |x, y| x.checked_sub(y).map(Value::Int)),
         (Binary::MulInt, |x, y| x.checked_mul(y).map(Value::Int)),
@@ -157,7 +164,7 @@ fn of_two_integers() {
 
 #[test]
 fn of_truth_values() {
-    let operations: [(Binary, fn(bool, bool) -> bool); 5] = [
+    let operations: [(Binary, OfFlags); 5] = [
         (Binary::AndBool, |x, y| x & y),
         (Binary::OrBool, |x, y| x | y),
         (Binary::XorBool, |x, y| x ^ y),
