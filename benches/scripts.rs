@@ -8,6 +8,8 @@
 //!
 //! Every round measures all sides one after the other; ratios are medians over the rounds.
 
+#![expect(clippy::manual_midpoint, reason = "as the scripts have it")]
+
 use std::hint::black_box;
 use std::io::Write;
 use std::path::Path;
@@ -111,7 +113,7 @@ struct RustRun<'a> {
 }
 
 impl RustRun<'_> {
-    fn run<E: Env, D: Discretiser<E, State = usize>, R: RewardModel<E>>(
+    fn run<E, D, R>(
         &self,
         env: E,
         discretiser: D,
@@ -119,7 +121,9 @@ impl RustRun<'_> {
         reward: R,
     ) -> (Vec<f64>, f64)
     where
-        E: Clone + 'static,
+        E: Env + Clone + 'static,
+        D: Discretiser<E, State = usize>,
+        R: RewardModel<E>,
     {
         let variant = self.variant;
         let (n_cells, n_actions, seed) =
@@ -291,8 +295,11 @@ const SAMPLES: [Sample; 5] = [
     },
 ];
 
+/// A function of fields.
+type Call = dyn FnMut(&[f64]) -> f64;
+
 /// The callback of `sample` as it is run now: native, or interpreted.
-fn callback(sample: &Sample) -> Box<dyn FnMut(&[f64]) -> f64> {
+fn callback(sample: &Sample) -> Box<Call> {
     let plan = load(Path::new(sample.script)).unwrap_or_else(|d| panic!("{}: {d}", sample.name));
     let host = Host::open(&plan).expect("it was loaded");
     let variant = &plan.variants[sample.variant];

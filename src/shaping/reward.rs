@@ -130,7 +130,7 @@ pub struct ScriptedReward<E: Env> {
     terms: Vec<StepFn<E>>,
     /// Whether one of them reads the inputs.
     is_compiled: bool,
-    inputs: StepInputs,
+    inputs: Box<StepInputs>,
 }
 
 impl<E: Env> ScriptedReward<E> {
@@ -138,7 +138,7 @@ impl<E: Env> ScriptedReward<E> {
     /// fields.
     pub fn new(reward: Option<StepFn<E>>, terms: Vec<StepFn<E>>, n_fields: usize) -> Self {
         let is_compiled = reward.iter().chain(&terms).any(StepFn::is_compiled);
-        Self { reward, terms, is_compiled, inputs: StepInputs::new(n_fields) }
+        Self { reward, terms, is_compiled, inputs: Box::new(StepInputs::new(n_fields)) }
     }
 }
 

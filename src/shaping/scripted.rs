@@ -10,7 +10,14 @@ use crate::mdp::{Env, MAX_FIELDS};
 /// The largest number of inputs of a function: two states and the rest of a step.
 const MAX_INPUTS: usize = 2 * MAX_FIELDS + 5;
 
-type Script<F> = Box<F>;
+/// Φ as the interpreter has it.
+type ScriptPhi = dyn FnMut(&[f64], u32) -> Result<f64, Fault>;
+/// A cell as the interpreter has it.
+type ScriptCell = dyn FnMut(&[f64]) -> Result<usize, Fault>;
+/// A shield as the interpreter has it.
+type ScriptShield = dyn FnMut(&[f64]) -> Result<ActionSet, Fault>;
+/// A number of a step as the interpreter has it.
+type ScriptOfStep<E> = dyn FnMut(&E, &Transition<'_, <E as Env>::Obs>) -> Result<f64, Fault>;
 
 /// From a state's fields and the episode, counted from 1, to Φ.
 pub struct PhiFn {
@@ -18,7 +25,7 @@ pub struct PhiFn {
     /// Whether it depends on the episode.
     of_episode: bool,
     shift: f64,
-    script: Script<dyn FnMut(&[f64], u32) -> Result<f64, Fault>>,
+    script: Box<ScriptPhi>,
 }
 
 impl PhiFn {
@@ -74,7 +81,7 @@ impl PhiFn {
 pub struct CellFn {
     kernel: Option<Arc<Kernel<i64>>>,
     scales: Vec<Scale>,
-    script: Script<dyn FnMut(&[f64]) -> Result<usize, Fault>>,
+    script: Box<ScriptCell>,
 }
 
 impl CellFn {
@@ -124,7 +131,7 @@ impl CellFn {
 pub struct ShieldFn {
     kernel: Option<Arc<Kernel<i64>>>,
     n_actions: usize,
-    script: Script<dyn FnMut(&[f64]) -> Result<ActionSet, Fault>>,
+    script: Box<ScriptShield>,
 }
 
 impl ShieldFn {
@@ -172,13 +179,10 @@ impl ShieldFn {
     }
 }
 
-/// A function from a step, as a script sees it, to a number.
-type ScriptOfStep<E> = dyn FnMut(&E, &Transition<'_, <E as Env>::Obs>) -> Result<f64, Fault>;
-
 /// From a step to a number: a reward, or a term of one.
 pub struct StepFn<E: Env> {
     kernel: Option<Arc<Kernel<f64>>>,
-    script: Script<ScriptOfStep<E>>,
+    script: Box<ScriptOfStep<E>>,
 }
 
 impl<E: Env> StepFn<E> {

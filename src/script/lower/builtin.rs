@@ -151,7 +151,7 @@ impl Lowering<'_> {
                 let odd = Expr::Int(i64::from(name == "is_odd"));
                 binary(Binary::Int(Compare::Eq), bit, odd)
             }
-            ("to_int", Float) => self.to_int(e, position)?,
+            ("to_int", Float) => self.integer_of(e, position)?,
             ("sign", Float | Int) => self.sign(e, ty, position)?,
             (_, Float | Int) => {
                 let found = math::UNARY.iter().find(|(n, _)| *n == name);
@@ -163,7 +163,7 @@ impl Lowering<'_> {
     }
 
     /// Rhai refuses what does not fit; what is not a number is 0.
-    fn to_int(&mut self, x: Expr, position: Position) -> Lowered<Expr> {
+    fn integer_of(&mut self, x: Expr, position: Position) -> Lowered<Expr> {
         let x = self.held(x, position)?;
         let beyond =
             |how, limit: i64| binary(Binary::Float(how), x.clone(), Expr::Float(limit as f64));
@@ -281,7 +281,7 @@ fn clamp(x: &Number, lo: &Number, hi: &Number) -> Option<Expr> {
             let raised = binary(Binary::MaxInt, x.0.clone(), lo.0.clone());
             Some(binary(Binary::MinInt, raised, hi.0.clone()))
         }
-        (Float, Float, Float) | (Float, Int, Int) | (Int, Float, Float) => {
+        (Float | Int, Float, Float) | (Float, Int, Int) => {
             let raised = binary(Binary::Greatest, float(x), float(lo));
             Some(binary(Binary::Least, raised, float(hi)))
         }

@@ -8,6 +8,10 @@ use super::value::{Binding, Slot, Val};
 use super::{Frame, Lowered, Lowering, MAX_DEPTH, Return, is_stable, outside};
 use crate::jit::ir::{self, Stmt};
 
+/// What a function returns whose `return`s do not agree.
+const MIXED: &str = "a function that returns a value on one path only, or one type here and another \
+                     there";
+
 impl Lowering<'_> {
     /// The value of a call.
     pub(super) fn call(&mut self, call: &FnCallExpr, position: Position) -> Lowered<Val> {
@@ -210,8 +214,6 @@ impl Lowering<'_> {
         else {
             unreachable!("the root returns to the host");
         };
-        const MIXED: &str = "a function that returns a value on one path only, or one type here and \
-                             another there";
         let value = match (value, val) {
             (None, Val::Num(e)) => {
                 let local = self.local(self.program.type_of(&e), position)?;

@@ -74,7 +74,7 @@ impl Lowering<'_> {
                 Link::Property(name) => self.property(&val, name, position)?,
                 Link::Index(_) => {
                     let index = given.next().expect("one for each index");
-                    self.index(&val, index, position)?
+                    self.index(&val, &index, position)?
                 }
                 Link::Method(call) => {
                     let args: Vec<Val> = given.by_ref().take(call.args.len()).collect();
@@ -138,8 +138,8 @@ impl Lowering<'_> {
     }
 
     /// `val[index]`.
-    fn index(&mut self, val: &Val, index: Val, position: Position) -> Lowered<Val> {
-        if let Val::Data(key) = &index {
+    fn index(&mut self, val: &Val, index: &Val, position: Position) -> Lowered<Val> {
+        if let Val::Data(key) = index {
             return match (val, &**key) {
                 (Val::State(_) | Val::Step, Value::Str(name)) => self.property(val, name, position),
                 (Val::Data(value), Value::Str(name)) if matches!(**value, Value::Map(_)) => {
@@ -148,7 +148,7 @@ impl Lowering<'_> {
                 _ => outside(index.described(), position),
             };
         }
-        let Some((index, Type::Int)) = self.number(&index) else {
+        let Some((index, Type::Int)) = self.number(index) else {
             return outside(format!("{} as an index", index.described()), position);
         };
         match val {

@@ -19,6 +19,9 @@ pub(in crate::script) struct Function {
     pub(super) assigned: Rc<BTreeSet<String>>,
 }
 
+/// Functions by their names and numbers of parameters; `None` for those that are not there.
+type Known = BTreeMap<(String, usize), Option<Rc<Function>>>;
+
 /// One file's functions, read when they are asked for.
 pub(in crate::script) struct File {
     /// Its name in messages.
@@ -29,7 +32,7 @@ pub(in crate::script) struct File {
     pub(super) cases: BTreeMap<u64, super::switch::Case>,
     /// The files that it imports, by their aliases.
     pub(super) aliases: BTreeMap<String, usize>,
-    read: RefCell<BTreeMap<(String, usize), Option<Rc<Function>>>>,
+    read: RefCell<Known>,
 }
 
 /// A script and the files that it imports: the script is the first.

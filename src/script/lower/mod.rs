@@ -316,13 +316,10 @@ impl Lowering<'_> {
                 return self.return_cell(&shape, vec![e], position);
             }
             (Want::Cell(shape), val) => {
-                return match self.elements(&val) {
-                    Some(indices) => self.return_cell(&shape, indices, position),
-                    None => {
-                        self.code.push(Stmt::Trap);
-                        Ok(())
-                    }
-                };
+                if let Some(indices) = self.elements(&val) {
+                    return self.return_cell(&shape, indices, position);
+                }
+                Stmt::Trap
             }
             // The interpreter says what is wrong with it.
             _ => Stmt::Trap,

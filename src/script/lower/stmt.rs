@@ -248,18 +248,13 @@ impl Lowering<'_> {
                 self.count(position)?;
                 let vals = self.in_order(items.iter())?;
                 let numbers = vals.iter().map(|v| self.number(v).map(|(e, _)| e));
-                match numbers.collect::<Option<Vec<_>>>() {
-                    Some(numbers) => {
-                        let Want::Cell(shape) = self.want.clone() else {
-                            unreachable!("just asked")
-                        };
-                        self.return_cell(&shape, numbers, position)
-                    }
-                    None => {
-                        self.trap();
-                        Ok(())
-                    }
+                if let (Some(numbers), Want::Cell(shape)) =
+                    (numbers.collect::<Option<Vec<_>>>(), self.want.clone())
+                {
+                    return self.return_cell(&shape, numbers, position);
                 }
+                self.trap();
+                Ok(())
             }
             other => {
                 let val = self.expr(other)?;

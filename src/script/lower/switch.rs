@@ -50,9 +50,7 @@ pub(super) fn cases(text: &str) -> BTreeMap<u64, Case> {
     let mut found = BTreeMap::new();
     ast.walk(&mut |path: &[ASTNode<'_>]| {
         if let Some(ASTNode::Stmt(Syntax::Switch(x, _))) = path.last() {
-            for (hash, list) in &x.1.cases {
-                found.insert(*hash, cases[list.blocks[0]]);
-            }
+            found.extend(x.1.cases.iter().map(|(hash, list)| (*hash, cases[list.blocks[0]])));
         }
         true
     });
@@ -90,14 +88,13 @@ impl Lowering<'_> {
             ir::Expr::Binary(Binary::Int(how), value.clone().into(), ir::Expr::Int(x).into())
         };
         // By value, so that the order is the same in every process.
-        let mut constants = Vec::new();
-        let mut unknown = 0;
-        for (hash, list) in &cases.cases {
-            match self.file().cases.get(hash).copied() {
-                Some(case) => constants.push((case, list)),
-                None => unknown += 1,
-            }
-        }
+        let file = self.file();
+        let known = cases
+            .cases
+            .iter()
+            .filter_map(|(hash, list)| file.cases.get(hash).map(|case| (*case, list)));
+        let mut constants: Vec<_> = known.collect();
+        let unknown = cases.cases.len() - constants.len();
         // The hashes of the ranges are among them.
         if unknown > cases.ranges.len() {
             return outside("a case that is not an integer", position);

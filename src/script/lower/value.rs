@@ -137,15 +137,12 @@ impl Lowering<'_> {
     pub(super) fn table(&mut self, value: &Value) -> Option<Val> {
         let mut items = Vec::new();
         let dims = flatten(value, &mut items)?;
-        let table = match items.first()? {
-            Value::Int(_) => {
-                let int = |v: &Value| if let Value::Int(x) = v { Some(*x) } else { None };
-                Table::Int(items.iter().map(int).collect::<Option<_>>()?)
-            }
-            _ => {
-                let float = |v: &Value| if let Value::Float(x) = v { Some(*x) } else { None };
-                Table::Float(items.iter().map(float).collect::<Option<_>>()?)
-            }
+        let int = |v: &Value| if let Value::Int(x) = v { Some(*x) } else { None };
+        let float = |v: &Value| if let Value::Float(x) = v { Some(*x) } else { None };
+        let table = if let Value::Int(_) = items.first()? {
+            Table::Int(items.iter().map(int).collect::<Option<_>>()?)
+        } else {
+            Table::Float(items.iter().map(float).collect::<Option<_>>()?)
         };
         let same = |known: &Table| match (known, &table) {
             (Table::Int(a), Table::Int(b)) => a == b,

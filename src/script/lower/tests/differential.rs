@@ -62,7 +62,7 @@ pub(super) struct Step {
     pub(super) reward: f64,
     pub(super) terminated: bool,
     pub(super) truncated: bool,
-    pub(super) step: i64,
+    pub(super) number: i64,
 }
 
 impl Step {
@@ -76,7 +76,7 @@ impl Step {
             reward: g.float_input(),
             terminated: g.int_input() % 2 == 0,
             truncated: g.int_input() % 2 == 0,
-            step: g.int_input().abs(),
+            number: g.int_input().abs(),
         }
     }
 
@@ -89,7 +89,7 @@ impl Step {
         inputs[at.reward] = self.reward;
         inputs[at.terminated] = f64::from(u8::from(self.terminated));
         inputs[at.truncated] = f64::from(u8::from(self.truncated));
-        inputs[at.step] = self.step as f64;
+        inputs[at.step] = self.number as f64;
         inputs
     }
 }
@@ -139,7 +139,7 @@ impl Bench {
             next_state: state(&step.next_state),
             terminated: step.terminated,
             truncated: step.truncated,
-            step: step.step,
+            step: step.number,
         })
     }
 
@@ -178,17 +178,14 @@ impl Bench {
     ///
     /// # Panics
     /// If they disagree.
-    pub(super) fn compare(&self, name: &str, want: Want, steps: &[Step]) -> Option<()> {
-        let program = match self.lower(name, want.clone()) {
-            Ok(program) => program,
-            Err(_) => return None,
-        };
+    pub(super) fn compare(&self, name: &str, want: &Want, steps: &[Step]) -> Option<()> {
+        let program = self.lower(name, want.clone()).ok()?;
         let machine = Machine::new(&program);
         for step in steps {
             let inputs = step.inputs();
             let evaluated = evaluate(&program, &inputs);
             let compiled = machine.call(&inputs);
-            let (interpreted, operations) = self.interpret(name, &want, step);
+            let (interpreted, operations) = self.interpret(name, want, step);
             let fail = |what: &str| -> ! {
                 let error = self.host.call(&Prepared::named(name), [self.view(step)]).err();
                 panic!(
@@ -279,7 +276,7 @@ fn differential(seed: u64, n: usize) -> usize {
         };
         for (i, ty) in results.into_iter().enumerate() {
             let steps: Vec<Step> = (0..12).map(|_| Step::random(&mut g)).collect();
-            lowered += usize::from(bench.compare(&format!("p{i}"), want(ty), &steps).is_some());
+            lowered += usize::from(bench.compare(&format!("p{i}"), &want(ty), &steps).is_some());
         }
     }
     lowered

@@ -92,7 +92,7 @@ impl Generator {
                 self.result = result;
                 self.body(result)
             };
-            text += &format!("fn p{i}(t) {{ {body} }}\n");
+            text.extend(["fn p", &i.to_string(), "(t) { ", &body, " }\n"]);
             results.push(result);
         }
         (text, results)
@@ -449,9 +449,9 @@ impl Generator {
                 let (mut a, mut b) = (self.number(d), self.number(d));
                 if (a.1, b.1) == (Ty::Int, Ty::Int) {
                     if self.chance(2) {
-                        a.0 = self.expr(Ty::Float, d)
+                        a.0 = self.expr(Ty::Float, d);
                     } else {
-                        b.0 = self.leaf(Ty::Float)
+                        b.0 = self.leaf(Ty::Float);
                     }
                 }
                 a.1 = Ty::Float;
