@@ -1,6 +1,6 @@
 //! Calling script functions while training.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use rhai::{AST, CallFnOptions, Dynamic, Engine, FnPtr, Scope};
@@ -8,10 +8,12 @@ use rhai::{AST, CallFnOptions, Dynamic, Engine, FnPtr, Scope};
 use super::diagnostic::{Diagnostic, Place};
 use super::engine::{CALLBACK_OPERATIONS, Context};
 use super::errors::diagnostic;
+use super::memory;
 use super::params::show;
 use super::plan::Callback;
 use super::record;
 use super::state::{State, StepView};
+use super::watch::kept_too_much;
 use crate::mdp::{Action, Env, Schema};
 use crate::shaping::{
     ActionFn, ActionSet, CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn, Scale, ShieldFn,
@@ -25,6 +27,10 @@ fn fault(diagnostic: Diagnostic) -> Fault {
 struct Prepared {
     callback: Callback,
     captures: Vec<Dynamic>,
+    /// Its number for the ceilings on time and memory.
+    activity: usize,
+    /// Bytes that its calls have kept so far.
+    kept: Cell<isize>,
 }
 
 /// One thread's compiled script, ready to be called.
@@ -52,7 +58,11 @@ impl Callbacks {
     fn prepare(&self, callback: &Callback) -> Prepared {
         let function = |name: &str| self.function(name);
         let captures = callback.captures.iter().map(|v| v.thaw(&function)).collect();
-        Prepared { callback: callback.clone(), captures }
+        let place = self.definition(&callback.function).or_else(|| callback.place.clone());
+        let line = place.as_ref().and_then(|place| self.context.sources.borrow().line(place));
+        let doing = format!("calling the function {}", callback.described());
+        let activity = self.context.watched.activity(doing, place, line.map(Into::into));
+        Prepared { callback: callback.clone(), captures, activity, kept: Cell::new(0) }
     }
 
     /// Calls `callback` with `given` after its captured values, which it gets as copies: what it
@@ -62,6 +72,8 @@ impl Callbacks {
         callback: &Prepared,
         given: [Dynamic; N],
     ) -> Result<Dynamic, Diagnostic> {
+        let before = memory::taken() - given.iter().map(heap).sum::<isize>();
+        let turn = self.context.watched.call(callback.activity);
         let mut args = Vec::with_capacity(callback.captures.len() + N);
         args.extend(callback.captures.iter().cloned());
         args.extend(given);
@@ -69,13 +81,18 @@ impl Callbacks {
         let mut scope = self.scope.borrow_mut();
         let name = &callback.callback.function;
         self.context.operations.set(0);
-        self.engine
-            .call_fn_with_options::<Dynamic>(options, &mut scope, &self.ast, name, args)
-            .map_err(|e| {
-                // A used-up budget or stack loses its place on the way out.
-                let place = self.definition(name).or_else(|| callback.callback.place.clone());
-                self.annotate(diagnostic(&self.context, &e, None).at(place))
-            })
+        let result =
+            self.engine.call_fn_with_options::<Dynamic>(options, &mut scope, &self.ast, name, args);
+        drop(turn);
+        // A used-up budget or stack loses its place on the way out.
+        let place = || self.definition(name).or_else(|| callback.callback.place.clone());
+        let fail = |d: Diagnostic| self.annotate(d.at(place()));
+        let value = result.map_err(|e| fail(diagnostic(&self.context, &e, None)))?;
+        callback.kept.update(|kept| kept + memory::taken() - heap(&value) - before);
+        match kept_too_much(callback.kept.get()) {
+            None => Ok(value),
+            Some(d) => Err(fail(d)),
+        }
     }
 
     /// Where the script defines the function `name`.
@@ -349,6 +366,20 @@ impl Callbacks {
             )
         })
     }
+}
+
+/// What a value that callbacks get or return holds on the heap, in bytes.
+fn heap(value: &Dynamic) -> isize {
+    let bytes = if value.is::<State>() {
+        size_of::<State>()
+    } else if value.is::<StepView>() {
+        size_of::<StepView>()
+    } else if let Some(array) = value.read_lock::<rhai::Array>() {
+        size_of::<rhai::Array>() + array.capacity() * size_of::<Dynamic>()
+    } else {
+        0
+    };
+    bytes as isize
 }
 
 /// An action's number, with its name if it has one.

@@ -5,7 +5,7 @@
 //! - [`Diagnostic`]: a mistake, with its file, line, column and a suggestion
 //! - [`Value`]: what callbacks may capture; plain data that can cross threads and be hashed
 //!
-//! All contact with Rhai's syntax tree is in `syntax`, all limits are in `engine`, every function
+//! All contact with Rhai's syntax tree is in `syntax`, limits are in `engine` and `watch`, every function
 //! that scripts can call is listed in [`functions`], every key of an experiment in [`keys`].
 
 mod builders;
@@ -19,6 +19,7 @@ mod freeze;
 pub mod functions;
 mod host;
 pub mod keys;
+mod memory;
 mod network;
 mod numeric;
 mod params;
@@ -32,12 +33,14 @@ mod source;
 mod state;
 mod syntax;
 mod value;
+mod watch;
 mod world;
 
 pub use callback::Callbacks;
 pub(crate) use diagnostic::suggest;
 pub use diagnostic::{Diagnostic, Place, Severity};
 pub use host::{Host, load};
+pub use memory::CountingAllocator;
 pub use plan::{
     Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, StartFile,
     StartModel, Variant,
@@ -45,3 +48,4 @@ pub use plan::{
 pub use shaping::{AdviceOn, Shaping};
 pub use source::{Source, SourceSet};
 pub use value::Value;
+pub use watch::{read_ledger, start as start_watching};
