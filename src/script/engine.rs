@@ -14,7 +14,7 @@ use super::diagnostic::{Diagnostic, Place};
 use super::source::SourceSet;
 use super::syntax::Syntax;
 use super::watch::Watched;
-use super::{builders, numeric, record, sandbox, state};
+use super::{builders, numeric, record, sandbox, sorting, state};
 
 /// Operations that building the plan may take: about half a second.
 const PLAN_OPERATIONS: u64 = 5_000_000;
@@ -85,6 +85,7 @@ pub(super) fn engine(context: &Rc<Context>) -> Engine {
     StandardPackage::new().register_into_engine(&mut engine);
     limits(&mut engine);
     sandbox::register(&mut engine, context);
+    sorting::register(&mut engine);
     numeric::register(&mut engine);
     state::register(&mut engine, context);
     record::register(&mut engine);

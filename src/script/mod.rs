@@ -29,6 +29,7 @@ mod resolve;
 mod sandbox;
 mod setting;
 mod shaping;
+mod sorting;
 mod source;
 mod state;
 mod syntax;
