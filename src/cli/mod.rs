@@ -164,11 +164,7 @@ impl Command {
 /// Parses the arguments, runs the command, maps its outcome to an exit code.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    if cli.command.runs_scripts() {
-        supervise::supervised(|| outcome(cli))
-    } else {
-        outcome(cli)
-    }
+    if cli.command.runs_scripts() { supervise::supervised(|| outcome(cli)) } else { outcome(cli) }
 }
 
 fn outcome(cli: Cli) -> ExitCode {

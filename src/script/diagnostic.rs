@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 
+/// Characters of a message that are shown: a script may have long names.
+const MAX_MESSAGE: usize = 2_000;
 /// Characters of a source line that are shown behind the place.
 const MAX_BEHIND: usize = 200;
 
@@ -100,7 +102,9 @@ impl Diagnostic {
             Severity::Error => Level::ERROR,
             Severity::Warning => Level::WARNING,
         };
-        let title = level.primary_title(self.message.as_str());
+        let end = self.message.char_indices().nth(MAX_MESSAGE).map(|(end, _)| end);
+        let message = end.map_or(self.message.clone(), |end| format!("{}…", &self.message[..end]));
+        let title = level.primary_title(message);
         let source = self.source_line.as_deref().unwrap_or_default();
         // What lies far behind the place is of no use.
         let end = self.place.as_ref().map_or(0, |place| place.column.saturating_add(MAX_BEHIND));

@@ -63,9 +63,10 @@ fn order(a: &Dynamic, b: &Dynamic) -> Ordering {
         return a.cmp(&b);
     }
     let whole = |v: &Dynamic| {
-        v.as_int().ok().or(v.as_char().ok().map(|c| i64::from(u32::from(c)))).or_else(|| {
-            v.as_bool().ok().map(i64::from)
-        })
+        v.as_int()
+            .ok()
+            .or(v.as_char().ok().map(|c| i64::from(u32::from(c))))
+            .or_else(|| v.as_bool().ok().map(i64::from))
     };
     whole(a).cmp(&whole(b))
 }

@@ -309,9 +309,9 @@ fn violation(seen: &mut Vec<Seen>) -> Option<Diagnostic> {
                     known.used = processor_time(slot);
                 }
                 let wall = known.since.elapsed();
-                let used = known.used.and_then(|before| {
-                    processor_time(slot).map(|now| now.saturating_sub(before))
-                });
+                let used = known
+                    .used
+                    .and_then(|before| processor_time(slot).map(|now| now.saturating_sub(before)));
                 let used = used.unwrap_or_default();
                 if used > SOFT_TIME || wall > WALL_TIME.mul_f64(0.8) {
                     slot.stop.store(turn, Ordering::Relaxed);
@@ -394,7 +394,8 @@ pub fn read_ledger(ledger: &mut std::fs::File, diagnostic: Diagnostic) -> Diagno
     use io::{BufRead, Seek};
     type Word = (String, String, Option<(String, usize, usize)>, Option<Box<str>>);
     let mut line = Vec::new();
-    let read = ledger.rewind().and_then(|()| io::BufReader::new(ledger).read_until(b'\n', &mut line));
+    let read =
+        ledger.rewind().and_then(|()| io::BufReader::new(ledger).read_until(b'\n', &mut line));
     let word = read.ok().and_then(|_| serde_json::from_slice::<Word>(&line).ok());
     let Some((doing, circumstance, place, source_line)) = word else { return diagnostic };
     let place = place.map(|(file, line, column)| Place { file: file.into(), line, column });

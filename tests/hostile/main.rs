@@ -8,6 +8,8 @@
 //! // Hint: …
 //! ```
 //!
+//! (The place is `somewhere` where time or memory runs out, for that is chance.)
+//!
 //! Whatever they do, it ends in that error and exit code 2, within 2 s of processor time and
 //! 300 MB. What is measured is this machine's own account of the process and of the one it
 //! watches over: processor time, for a machine may be loaded, and the most memory that was resident.
@@ -108,6 +110,9 @@ fn said(stderr: &str, script: &str) -> String {
             message = rest;
         } else if let Some(place) = trimmed.strip_prefix("--> ").filter(|_| !placed) {
             let place = place.strip_prefix(script).map_or(place, |at| &at[1..]);
+            // Where time or memory runs out is chance.
+            let place =
+                if message.starts_with("the script takes too") { "somewhere" } else { place };
             writeln!(text, "// Error: {place} {message}").unwrap();
             placed = true;
         } else if let Some(note) = trimmed.strip_prefix("= note: ") {
@@ -116,7 +121,8 @@ fn said(stderr: &str, script: &str) -> String {
             writeln!(text, "// Hint: {hint}").unwrap();
         }
     }
-    if placed { text } else { format!("// Error: {message}\n{text}") }
+    let chance = if message.starts_with("the script takes too") { "somewhere " } else { "" };
+    if placed { text } else { format!("// Error: {chance}{message}\n{text}") }
 }
 
 fn scripts() -> Vec<PathBuf> {

@@ -74,7 +74,8 @@ fn a_child_that_dies_is_explained() {
         let (code, text) = end(parent);
         assert_eq!(code, Some(2), "{text}");
         assert!(text.starts_with(words), "{text}");
-        for part in ["--> long.rhai:1:", "last seen calling the function `slow`", "variant `long`"] {
+        for part in ["--> long.rhai:1:", "last seen calling the function `slow`", "variant `long`"]
+        {
             assert!(text.contains(part), "{part}: {text}");
         }
     }

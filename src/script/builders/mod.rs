@@ -6,12 +6,12 @@ mod features;
 
 use std::rc::Rc;
 
-use rhai::{
-    Array, Dynamic, Engine, EvalAltResult, FnPtr, ImmutableString, Map, NativeCallContext,
-};
+use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, ImmutableString, Map, NativeCallContext};
 
 use super::diagnostic::{Diagnostic, Place};
-use super::draft::{EnvDraft, ExperimentDraft, Located, Spot, StudyDraft, captured_now, is_name, notes};
+use super::draft::{
+    EnvDraft, ExperimentDraft, Located, Spot, StudyDraft, captured_now, is_name, notes,
+};
 use super::engine::Context;
 use super::params::{number, show, whole};
 use super::plan::GoldenBudget;
