@@ -13,7 +13,7 @@ use super::params::show;
 use super::plan::Callback;
 use super::record;
 use super::state::{State, StepView};
-use super::watch::kept_too_much;
+use super::watch::{Watched, kept_too_much};
 use crate::mdp::{Action, Env, Schema};
 use crate::shaping::{
     ActionFn, ActionSet, CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn, Scale, ShieldFn,
@@ -61,7 +61,7 @@ impl Callbacks {
         let place = self.definition(&callback.function).or_else(|| callback.place.clone());
         let line = place.as_ref().and_then(|place| self.context.sources.borrow().line(place));
         let doing = format!("calling the function {}", callback.described());
-        let activity = self.context.watched.activity(doing, place, line.map(Into::into));
+        let activity = Watched::activity(doing, place, line.map(Into::into));
         Prepared { callback: callback.clone(), captures, activity, kept: Cell::new(0) }
     }
 

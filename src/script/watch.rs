@@ -93,7 +93,7 @@ struct Slot {
     /// The turn that shall end.
     stop: AtomicU64,
     activity: AtomicUsize,
-    /// For what: `in variant `plain``.
+    /// For which variant, in the words of a note.
     circumstance: Mutex<Arc<str>>,
 }
 
@@ -149,12 +149,7 @@ impl Watched {
     }
 
     /// What runs, by a number for [`Self::turn`]; the same for the same.
-    pub(super) fn activity(
-        &self,
-        doing: String,
-        place: Option<Place>,
-        line: Option<Box<str>>,
-    ) -> usize {
+    pub(super) fn activity(doing: String, place: Option<Place>, line: Option<Box<str>>) -> usize {
         let activity = Activity { doing, place, source_line: line };
         let known = &mut locked(&REGISTER).activities;
         known.iter().position(|a| *a == activity).unwrap_or_else(|| {
@@ -170,7 +165,7 @@ impl Watched {
 
     /// Begins building a plan, or what belongs to it; it ends when the turn is dropped.
     pub(super) fn plan(&self, doing: &str) -> Turn<'_> {
-        let turn = self.turn(self.activity(doing.into(), None, None), PLAN_MEMORY);
+        let turn = self.turn(Self::activity(doing.into(), None, None), PLAN_MEMORY);
         self.announce();
         turn
     }
@@ -185,7 +180,7 @@ impl Watched {
     fn turn(&self, activity: usize, bytes: isize) -> Turn<'_> {
         let turn = self.slot.turn.load(Ordering::Relaxed);
         // A call within the building of the plan is part of it.
-        let outermost = self.on && turn % 2 == 0;
+        let outermost = self.on && turn.is_multiple_of(2);
         if outermost {
             self.slot.activity.store(activity, Ordering::Relaxed);
             self.slot.turn.store(turn + 1, Ordering::Release);
@@ -197,10 +192,9 @@ impl Watched {
     /// Whether the script shall stop now.
     #[inline]
     pub(super) fn stop(&self) -> Option<Stop> {
-        if self.slot.stop.load(Ordering::Relaxed) == self.slot.turn.load(Ordering::Relaxed)
-            && self.on
-            && self.slot.turn.load(Ordering::Relaxed) % 2 == 1
-        {
+        // No turn is stopped before the first, which is number 1.
+        let stop = self.slot.stop.load(Ordering::Relaxed);
+        if stop != 0 && stop == self.slot.turn.load(Ordering::Relaxed) {
             return Some(Stop::Time);
         }
         (memory::left() < LAST_MEMORY).then_some(Stop::Memory)

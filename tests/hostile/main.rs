@@ -33,7 +33,7 @@ const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/hostile");
 const PROCESSOR_TIME: Duration = Duration::from_secs(if cfg!(debug_assertions) { 12 } else { 2 });
 const MEMORY: u64 = 300_000_000;
 /// By then a machine is not loaded, but something hangs.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_mins(5);
 
 /// What came of a command.
 pub(crate) struct Ended {
