@@ -33,6 +33,9 @@ use crate::script::Diagnostic;
 #[derive(Debug, Parser)]
 #[command(name = "runner", version, about, arg_required_else_help = true)]
 struct Cli {
+    /// Interpret all callbacks of scripts: slower, with the same results
+    #[arg(long, global = true)]
+    no_jit: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -180,6 +183,9 @@ fn outcome(cli: Cli) -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<Outcome, Failure> {
+    if cli.no_jit {
+        crate::jit::disable();
+    }
     match cli.command {
         Command::Exec(args) => exec::run(&args),
         Command::Check(args) => check::run(&args),

@@ -4,9 +4,11 @@
 //! - [`Host`]: one thread's engine, in which callbacks are called
 //! - [`Diagnostic`]: a mistake, with its file, line, column and a suggestion
 //! - [`Value`]: what callbacks may capture; plain data that can cross threads and be hashed
+//! - [`Tier`]: a callback is run as machine code, or by the interpreter
 //!
-//! All contact with Rhai's syntax tree is in `syntax`, limits are in `engine` and `watch`, every function
-//! that scripts can call is listed in [`functions`], every key of an experiment in [`keys`].
+//! All contact with Rhai's syntax tree is in `syntax` and `lower`, limits are in `engine` and
+//! `watch`, every function that scripts can call is listed in [`functions`], every key of an
+//! experiment in [`keys`].
 
 mod builders;
 mod callback;
@@ -19,7 +21,9 @@ mod freeze;
 pub mod functions;
 mod host;
 pub mod keys;
+mod lower;
 mod memory;
+mod native;
 mod network;
 mod numeric;
 mod params;
@@ -42,6 +46,7 @@ pub(crate) use diagnostic::suggest;
 pub use diagnostic::{Diagnostic, Place, Severity};
 pub use host::{Host, load};
 pub use memory::CountingAllocator;
+pub use native::{Reason, Tier, Tiered};
 pub use plan::{
     Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, StartFile,
     StartModel, Variant,

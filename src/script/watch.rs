@@ -15,7 +15,7 @@ use super::diagnostic::{Diagnostic, Place};
 use super::memory;
 
 /// Unoptimised code is several times slower.
-const SLOWNESS: u32 = if cfg!(debug_assertions) { 4 } else { 1 };
+const SLOWNESS: u32 = if cfg!(debug_assertions) { 2 } else { 1 };
 /// Processor time after which the script is asked to stop: for building the plan, or for one call of
 /// a callback.
 const SOFT_TIME: Duration = Duration::from_millis(1200 * SLOWNESS as u64);

@@ -30,7 +30,7 @@ use wait4::Wait4;
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/hostile");
 
 /// Unoptimised code is several times slower, and so are its ceilings.
-const PROCESSOR_TIME: Duration = Duration::from_secs(if cfg!(debug_assertions) { 12 } else { 2 });
+const PROCESSOR_TIME: Duration = Duration::from_secs(if cfg!(debug_assertions) { 5 } else { 2 });
 const MEMORY: u64 = 300_000_000;
 /// By then a machine is not loaded, but something hangs.
 const PATIENCE: Duration = Duration::from_mins(5);

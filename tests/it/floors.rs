@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// From the top down.
-const FLOORS: [&str; 12] = [
+const FLOORS: [&str; 13] = [
     "cli",
     "report",
     "experiment",
@@ -13,6 +13,7 @@ const FLOORS: [&str; 12] = [
     "learn",
     "nn",
     "shaping",
+    "jit",
     "render",
     "env",
     "mdp",
