@@ -28,6 +28,7 @@ mod network;
 mod numeric;
 mod params;
 mod plan;
+mod prepared;
 mod record;
 mod resolve;
 mod sandbox;

@@ -395,3 +395,44 @@ pub fn read_ledger(ledger: &mut std::fs::File, diagnostic: Diagnostic) -> Diagno
     let place = place.map(|(file, line, column)| Place { file: file.into(), line, column });
     Activity { doing, place, source_line }.describe(diagnostic, "last seen", &circumstance)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_numbers_are_those_of_the_documentation() {
+        let text = include_str!("../../docs/safety.md");
+        let seconds = HARD_TIME.as_secs_f64() / f64::from(SLOWNESS);
+        let wall = WALL_TIME.as_secs() / u64::from(SLOWNESS);
+        let (plan, call, kept) = (PLAN_MEMORY / MIB, CALL_MEMORY / MIB, KEPT_MEMORY / MIB);
+        for row in [
+            format!("| processor time | {seconds} s | {seconds} s |"),
+            format!("| time by the clock on the wall | {wall} s | {wall} s |"),
+            format!("| memory | {plan} MiB | {call} MiB |"),
+            format!("| memory kept from call to call | | {kept} MiB |"),
+        ] {
+            assert!(text.contains(&row), "{row}");
+        }
+    }
+
+    #[test]
+    fn what_was_announced_is_read_by_the_other_process() {
+        let mut file = tempfile::tempfile().unwrap();
+        let ledger = Ledger(Mutex::new(file.try_clone().unwrap()));
+        let place = Place { file: "a.rhai".into(), line: 3, column: 4 };
+        let long = Activity { doing: "x".repeat(500), place: None, source_line: None };
+        ledger.write(&long, "");
+        let activity = Activity {
+            doing: "calling `f`".into(),
+            place: Some(place.clone()),
+            source_line: Some("fn f(s) { 1 }".into()),
+        };
+        ledger.write(&activity, "in variant `v`");
+        let d = read_ledger(&mut file, Diagnostic::error("it died"));
+        assert_eq!((d.place, d.source_line.as_deref()), (Some(place), Some("fn f(s) { 1 }")));
+        assert_eq!(d.notes, ["last seen calling `f`", "in variant `v`"]);
+        let empty = read_ledger(&mut tempfile::tempfile().unwrap(), Diagnostic::error("it died"));
+        assert_eq!(empty, Diagnostic::error("it died"));
+    }
+}
