@@ -8,7 +8,7 @@
 //! // Hint: …
 //! ```
 //!
-//! (The place is `somewhere` where time or memory runs out, for that is chance.)
+//! (The place is `somewhere`, and there are no notes, where time or memory runs out: that is chance.)
 //!
 //! Whatever they do, it ends in that error and exit code 2, within 2 s of processor time and
 //! 300 MB. What is measured is this machine's own account of the process and of the one it
@@ -101,28 +101,31 @@ impl Ended {
 
 /// The one error that the command shows, in the form of the expectations.
 fn said(stderr: &str, script: &str) -> String {
-    let mut text = String::new();
-    let mut message = "";
-    let mut placed = false;
-    for line in stderr.lines() {
+    let (mut message, mut place, mut rest) = ("", "", String::new());
+    // Warnings come before it.
+    for line in stderr.lines().skip_while(|line| !line.starts_with("error: ")) {
         let trimmed = line.trim_start();
-        if let Some(rest) = line.strip_prefix("error: ") {
-            message = rest;
-        } else if let Some(place) = trimmed.strip_prefix("--> ").filter(|_| !placed) {
-            let place = place.strip_prefix(script).map_or(place, |at| &at[1..]);
-            // Where time or memory runs out is chance.
-            let place =
-                if message.starts_with("the script takes too") { "somewhere" } else { place };
-            writeln!(text, "// Error: {place} {message}").unwrap();
-            placed = true;
-        } else if let Some(note) = trimmed.strip_prefix("= note: ") {
-            writeln!(text, "// Note: {note}").unwrap();
+        if let Some(text) = line.strip_prefix("error: ") {
+            message = text;
+        } else if let Some(at) = trimmed.strip_prefix("--> ").filter(|_| place.is_empty()) {
+            place = at.strip_prefix(script).map_or(at, |at| &at[1..]);
+        } else if let Some(note) = trimmed.strip_prefix("= note: ").filter(|_| !is_chance(message))
+        {
+            writeln!(rest, "// Note: {note}").unwrap();
         } else if let Some(hint) = trimmed.strip_prefix("= help: ") {
-            writeln!(text, "// Hint: {hint}").unwrap();
+            writeln!(rest, "// Hint: {hint}").unwrap();
         }
     }
-    let chance = if message.starts_with("the script takes too") { "somewhere " } else { "" };
-    if placed { text } else { format!("// Error: {chance}{message}\n{text}") }
+    if is_chance(message) {
+        place = "somewhere";
+    }
+    let space = if place.is_empty() { "" } else { " " };
+    format!("// Error: {place}{space}{message}\n{rest}")
+}
+
+/// Whether it depends on the machine where a script is when this happens.
+fn is_chance(message: &str) -> bool {
+    message.starts_with("the script takes too") || message.contains("keeps memory")
 }
 
 fn scripts() -> Vec<PathBuf> {

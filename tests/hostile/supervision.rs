@@ -64,7 +64,6 @@ fn end(mut parent: Child) -> (Option<i32>, String) {
 #[test]
 fn a_child_that_dies_is_explained() {
     for (name, words) in [
-        ("-SEGV", "error: the script has overflowed the stack"),
         ("-ABRT", "error: there is not enough memory for this run"),
         ("-KILL", "error: the run was killed from outside"),
     ] {
@@ -114,4 +113,27 @@ fn signals_reach_the_child_once() {
         // It was asked politely, not twice.
         assert!(text.contains("units are stored"), "{text}");
     }
+}
+
+/// Where there is no room for the large stack, ordinary recursion overflows the small one.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_overflowing_stack_is_explained() {
+    let overflows = |address_space: u32| {
+        let line = format!(
+            "ulimit -s 100; ulimit -v {address_space}; exec {} check plan_endless_recursion.rhai",
+            env!("CARGO_BIN_EXE_runner")
+        );
+        let output =
+            Command::new("bash").args(["-c", &line]).current_dir(super::FOLDER).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let begins = text.starts_with("error: the script has overflowed the stack\n");
+        if begins {
+            assert_eq!(output.status.code(), Some(2), "{text}");
+            assert!(text.contains("last seen building the plan"), "{text}");
+            assert!(!text.contains("overflowed its stack"), "{text}");
+        }
+        begins
+    };
+    assert!((50_000..110_000).step_by(5_000).any(overflows), "no stack was small enough");
 }
