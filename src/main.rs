@@ -2,6 +2,10 @@
 
 use std::process::ExitCode;
 
+/// Counts what each thread takes, so that no script takes all there is.
+#[global_allocator]
+static ALLOCATOR: runner::script::CountingAllocator = runner::script::CountingAllocator;
+
 fn main() -> ExitCode {
     runner::cli::main()
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::RecvTimeoutError;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args as ClapArgs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -20,6 +20,9 @@ use crate::report::closing::closing_table;
 use crate::report::results::{Findings, FolderError, Results};
 use crate::report::tensorboard;
 use crate::script::{Host, Plan, SeedList, load};
+
+/// Signals that come within this time of the first are the same one.
+const AT_ONCE: Duration = Duration::from_millis(200);
 
 #[derive(Debug, ClapArgs)]
 pub(super) struct Args {
@@ -149,8 +152,12 @@ fn train(
     // The signal handler outlives this function.
     let progress: &'static Progress = Box::leak(Box::default());
     // A second handler cannot be set; only one run happens per process.
-    let _ = ctrlc::set_handler(|| {
-        if progress.stop.swap(true, Ordering::Relaxed) {
+    let mut asked = None::<Instant>;
+    let _ = ctrlc::set_handler(move || {
+        // Those who signal a whole group of processes reach this one twice: by its parent too.
+        let again = asked.is_some_and(|asked| asked.elapsed() > AT_ONCE);
+        asked.get_or_insert_with(Instant::now);
+        if progress.stop.swap(true, Ordering::Relaxed) && again {
             #[expect(clippy::disallowed_methods, reason = "asked twice: at once, and for good")]
             std::process::exit(75);
         }

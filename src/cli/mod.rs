@@ -19,6 +19,7 @@ mod rollout;
 mod score;
 mod screen;
 mod show;
+mod supervise;
 mod view;
 
 use std::process::ExitCode;
@@ -142,9 +143,35 @@ impl From<StoredError> for Failure {
     }
 }
 
+impl Command {
+    /// Whether it may run what a script's author wrote.
+    fn runs_scripts(&self) -> bool {
+        match self {
+            Self::Exec(_)
+            | Self::Check(_)
+            | Self::Audit(_)
+            | Self::Score(_)
+            | Self::Show(_)
+            | Self::Play(_)
+            | Self::Export(_)
+            | Self::Golden(_) => true,
+            Self::List(_)
+            | Self::Rollout(_)
+            | Self::Parity(_)
+            | Self::New(_)
+            | Self::Completions(_) => false,
+        }
+    }
+}
+
 /// Parses the arguments, runs the command, maps its outcome to an exit code.
 pub fn main() -> ExitCode {
-    match run(Cli::parse()) {
+    let cli = Cli::parse();
+    if cli.command.runs_scripts() { supervise::supervised(|| outcome(cli)) } else { outcome(cli) }
+}
+
+fn outcome(cli: Cli) -> ExitCode {
+    match run(cli) {
         Ok(Outcome::Fine) | Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
         Ok(Outcome::Failed) => ExitCode::from(1),
         Ok(Outcome::Stopped) => ExitCode::from(75),

@@ -153,6 +153,7 @@ pub fn resume_unit(
     let env = variant.environment().map_err(|e| {
         UnitError::Script(Box::new(Diagnostic::error(e.message).maybe_hint(e.hint)))
     })?;
+    host.working_on(&variant.name);
     env.visit(RunUnit { host, variant, seed, at, stop, each }).map_err(|e| match e {
         UnitError::Script(d) => UnitError::Script(Box::new(host.annotate(*d))),
         UnitError::Diverged(d, record) => UnitError::Diverged(Box::new(host.annotate(*d)), record),

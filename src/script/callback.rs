@@ -4,15 +4,15 @@ use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use rhai::{AST, CallFnOptions, Dynamic, Engine, FnPtr, Scope};
+use rhai::{AST, Dynamic, Engine, Scope};
 
-use super::diagnostic::{Diagnostic, Place};
+use super::diagnostic::Diagnostic;
 use super::engine::{CALLBACK_OPERATIONS, Context};
-use super::errors::diagnostic;
 use super::lower::Library;
 use super::native::{Role, Tier};
 use super::params::show;
 use super::plan::Callback;
+use super::prepared::Prepared;
 use super::record;
 use super::state::{State, StepView};
 use super::value::Value;
@@ -26,29 +26,6 @@ fn fault(diagnostic: Diagnostic) -> Fault {
     Fault(Box::new(diagnostic))
 }
 
-/// A callback, ready to be called.
-pub(super) struct Prepared {
-    pub(super) callback: Callback,
-    captures: Vec<Dynamic>,
-}
-
-#[cfg(test)]
-impl Prepared {
-    /// The function `name`, without captured values.
-    pub(super) fn named(name: &str) -> Self {
-        let callback = Callback {
-            function: name.into(),
-            captures: Vec::new(),
-            arity: 1,
-            label: name.into(),
-            place: None,
-            digest: String::new(),
-            tier: super::native::TierCell::default(),
-        };
-        Self { callback, captures: Vec::new() }
-    }
-}
-
 /// One thread's compiled script, ready to be called.
 pub struct Callbacks {
     pub(super) engine: Engine,
@@ -58,7 +35,7 @@ pub struct Callbacks {
     pub(super) constants: BTreeMap<String, Value>,
     /// Its functions and those of its modules, once a callback is to be lowered.
     pub(super) library: OnceCell<Library>,
-    scope: RefCell<Scope<'static>>,
+    pub(super) scope: RefCell<Scope<'static>>,
 }
 
 impl Callbacks {
@@ -73,49 +50,6 @@ impl Callbacks {
         context.max_operations.set(CALLBACK_OPERATIONS);
         let (library, scope) = (OnceCell::new(), RefCell::new(Scope::new()));
         Rc::new(Self { engine, ast, context, constants, library, scope })
-    }
-
-    /// The function called `name`, as a value.
-    pub(super) fn function(&self, name: &str) -> Option<FnPtr> {
-        self.ast.iter_fn_def().find(|f| f.name == name).map(|f| FnPtr::from(f.clone()))
-    }
-
-    /// `callback` with its captured values turned back into the script's: once, not at every call.
-    fn prepare(&self, callback: &Callback) -> Prepared {
-        let function = |name: &str| self.function(name);
-        let captures = callback.captures.iter().map(|v| v.thaw(&function)).collect();
-        Prepared { callback: callback.clone(), captures }
-    }
-
-    /// Calls `callback` with `given` after its captured values, which it gets as copies: what it
-    /// does to them is forgotten.
-    pub(super) fn call<const N: usize>(
-        &self,
-        callback: &Prepared,
-        given: [Dynamic; N],
-    ) -> Result<Dynamic, Diagnostic> {
-        let mut args = Vec::with_capacity(callback.captures.len() + N);
-        args.extend(callback.captures.iter().cloned());
-        args.extend(given);
-        let options = CallFnOptions::new().eval_ast(false).rewind_scope(true);
-        let mut scope = self.scope.borrow_mut();
-        let name = &callback.callback.function;
-        self.context.operations.set(0);
-        self.engine
-            .call_fn_with_options::<Dynamic>(options, &mut scope, &self.ast, name, args)
-            .map_err(|e| {
-                // A used-up budget or stack loses its place on the way out.
-                let place = self.definition(name).or_else(|| callback.callback.place.clone());
-                self.annotate(diagnostic(&self.context, &e, None).at(place))
-            })
-    }
-
-    /// Where the script defines the function `name`.
-    fn definition(&self, name: &str) -> Option<Place> {
-        let script = self.context.sources.borrow().script.clone();
-        let syntax = self.context.syntax.borrow();
-        let (line, column) = syntax.get(&*script.name)?.definition(&script.text, name)?;
-        Some(Place { file: script.name, line, column })
     }
 
     pub(super) fn annotate(&self, diagnostic: Diagnostic) -> Diagnostic {

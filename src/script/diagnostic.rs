@@ -4,6 +4,11 @@ use std::sync::Arc;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 
+/// Characters of a message that are shown: a script may have long names.
+const MAX_MESSAGE: usize = 2_000;
+/// Characters of a source line that are shown behind the place.
+const MAX_BEHIND: usize = 200;
+
 /// A place in a script; line and column count from 1, columns in characters.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place {
@@ -97,8 +102,14 @@ impl Diagnostic {
             Severity::Error => Level::ERROR,
             Severity::Warning => Level::WARNING,
         };
-        let title = level.primary_title(self.message.as_str());
+        let end = self.message.char_indices().nth(MAX_MESSAGE).map(|(end, _)| end);
+        let message = end.map_or(self.message.clone(), |end| format!("{}…", &self.message[..end]));
+        let title = level.primary_title(message);
         let source = self.source_line.as_deref().unwrap_or_default();
+        // What lies far behind the place is of no use.
+        let end = self.place.as_ref().map_or(0, |place| place.column.saturating_add(MAX_BEHIND));
+        let end = source.char_indices().nth(end).map_or(source.len(), |(end, _)| end);
+        let source = &source[..end];
         let mut group = match &self.place {
             Some(place) => title.element(
                 Snippet::source(source)

@@ -223,7 +223,7 @@ impl ExperimentDraft {
             "terms" if removed => self.terms.clear(),
             "terms" => self.set_terms(value, spot)?,
             "notes" => {
-                self.notes = Some(text(value).ok_or_else(|| wrong(key, "a string", value))?);
+                self.notes = Some(notes(value)?);
             }
             key if SettingDraft::knows(key) => self.setting.set(key, value, spot)?,
             key if ShapingDraft::knows(key) => self.shaping.set(key, value, spot(key))?,
@@ -293,6 +293,13 @@ impl ExperimentDraft {
                 ))
                 .at(place));
             }
+            if !is_name(name) {
+                return Err(Diagnostic::error(
+                    "a term's name has 1 to 80 characters, no / or line breaks, and neither begins \
+                     nor ends with a blank",
+                )
+                .at(place));
+            }
             if value.is_unit() {
                 self.terms.remove(name.as_str());
                 continue;
@@ -302,6 +309,16 @@ impl ExperimentDraft {
         }
         Ok(())
     }
+}
+
+/// Characters of a rationale.
+const MAX_NOTES: usize = 10_000;
+
+/// The rationale of an experiment or a study.
+pub(super) fn notes(value: &Dynamic) -> Result<String, Diagnostic> {
+    text(value).filter(|text| text.chars().nth(MAX_NOTES).is_none()).ok_or_else(|| {
+        wrong("notes", &format!("a string of at most {MAX_NOTES} characters"), value)
+    })
 }
 
 /// Columns of `episodes.csv` that no term may take.

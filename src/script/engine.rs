@@ -13,14 +13,17 @@ use rhai::{
 use super::diagnostic::{Diagnostic, Place};
 use super::source::SourceSet;
 use super::syntax::Syntax;
-use super::{builders, numeric, record, sandbox, state};
+use super::watch::Watched;
+use super::{builders, numeric, record, sandbox, sorting, state};
 
-/// Operations that building the plan may take: about two seconds.
-const PLAN_OPERATIONS: u64 = 20_000_000;
+/// Operations that building the plan may take: about half a second.
+const PLAN_OPERATIONS: u64 = 5_000_000;
 /// Operations that one call of a callback may take: some tenths of a second.
 pub(super) const CALLBACK_OPERATIONS: u64 = 1_000_000;
 /// Lines that a script may print; further ones are dropped.
 const MAX_PRINTED: usize = 1_000;
+/// Characters of a line that it prints; the rest is left out.
+const MAX_LINE: usize = 1_000;
 
 /// What the engine's functions share with the host.
 #[derive(Debug)]
@@ -44,6 +47,8 @@ pub(super) struct Context {
     pub(super) operations: Cell<u64>,
     /// How many there may be.
     pub(super) max_operations: Cell<u64>,
+    /// This thread's ceilings on time and memory.
+    pub(super) watched: Watched,
 }
 
 impl Context {
@@ -59,6 +64,7 @@ impl Context {
             step_read: Rc::default(),
             operations: Cell::new(0),
             max_operations: Cell::new(PLAN_OPERATIONS),
+            watched: Watched::here(),
         })
     }
 
@@ -82,6 +88,7 @@ pub(super) fn engine(context: &Rc<Context>) -> Engine {
     StandardPackage::new().register_into_engine(&mut engine);
     limits(&mut engine);
     sandbox::register(&mut engine, context);
+    sorting::register(&mut engine);
     numeric::register(&mut engine);
     state::register(&mut engine, context);
     record::register(&mut engine);
@@ -122,19 +129,20 @@ fn limits(engine: &mut Engine) {
 
 fn output(engine: &mut Engine, context: &Rc<Context>) {
     let print = |context: Rc<Context>| {
-        move |text: String| {
+        move |text: &str| {
             let mut printed = context.printed.borrow_mut();
             if printed.len() < MAX_PRINTED {
-                printed.push(text);
+                let end = text.char_indices().nth(MAX_LINE).map(|(end, _)| end);
+                printed.push(end.map_or(text.into(), |end| format!("{}…", &text[..end])));
             } else if printed.len() == MAX_PRINTED {
                 printed.push("… (further output dropped)".into());
             }
         }
     };
     let on_print = print(context.clone());
-    engine.on_print(move |text| on_print(text.to_string()));
+    engine.on_print(on_print);
     let on_debug = print(context.clone());
-    engine.on_debug(move |text, _, _| on_debug(text.to_string()));
+    engine.on_debug(move |text, _, _| on_debug(text));
 }
 
 /// Lets functions see the constants of the top level, which Rhai alone does not.

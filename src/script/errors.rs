@@ -6,6 +6,8 @@ use super::diagnostic::{Diagnostic, Place, nearest};
 use super::engine::{BUILT_IN_CONSTANTS, Context};
 use super::functions::{MATHEMATICAL, functions};
 use super::params::show;
+use super::sandbox;
+use super::watch::Stop;
 
 /// Words of other languages, and what they are here.
 const FOREIGN: &[(&str, &str)] = &[
@@ -126,9 +128,10 @@ pub(super) fn diagnostic(
             return parse_diagnostic(context, &file, error, *position);
         }
         EvalAltResult::ErrorFunctionNotFound(signature, _) => not_found(context, signature),
-        EvalAltResult::ErrorTooManyOperations(_) | EvalAltResult::ErrorTerminated(..) => {
-            Diagnostic::error("the operation budget is used up").hint("is there an endless loop?")
+        EvalAltResult::ErrorTerminated(token, _) => {
+            sandbox::stopped(token).map_or_else(used_up, Stop::diagnostic)
         }
+        EvalAltResult::ErrorTooManyOperations(_) => used_up(),
         EvalAltResult::ErrorStackOverflow(_) => Diagnostic::error("calls are nested too deeply")
             .hint("does a function call itself without end?"),
         EvalAltResult::ErrorVariableNotFound(name, _) => {
@@ -156,6 +159,10 @@ pub(super) fn diagnostic(
         }
     };
     context.sources.borrow().annotate(d.at(place))
+}
+
+fn used_up() -> Diagnostic {
+    Diagnostic::error("the operation budget is used up").hint("is there an endless loop?")
 }
 
 /// `Unknown property 'size' - a getter is not registered for type 'i64'`, in other words.

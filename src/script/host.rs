@@ -34,6 +34,7 @@ pub fn load(path: &Path) -> Result<Plan, Diagnostic> {
 /// As [`load`].
 pub(super) fn load_sources(sources: SourceSet, name: &str) -> Result<Plan, Diagnostic> {
     let context = Context::new(sources);
+    let _turn = context.watched.plan("building the plan");
     let engine = engine(&context);
     let script = context.sources.borrow().script.clone();
     let ast = compile(&engine, &context, &script.name, &script.text)?;
@@ -94,6 +95,7 @@ impl Host {
     /// If the script does not compile (it did when the plan was made).
     pub fn open(plan: &Plan) -> Result<Self, Diagnostic> {
         let context = Context::new(plan.sources.clone());
+        let _turn = context.watched.plan("compiling the script once more");
         let mut engine = engine(&context);
         let script = plan.sources.script.clone();
         let ast = compile(&engine, &context, &script.name, &script.text)?;
@@ -131,6 +133,11 @@ impl Host {
             lines.push("… (further output of callbacks is not shown)".into());
         }
         lines
+    }
+
+    /// Says for which variant functions are called from now on, for when one never comes back.
+    pub fn working_on(&self, variant: &str) {
+        self.callbacks.context.watched.circumstance(&format!("in variant `{variant}`"));
     }
 
     /// The script's functions.

@@ -70,6 +70,7 @@ impl Callbacks {
     }
 
     fn compile(&self, callback: &Callback, role: Role<'_>, schema: &Schema) -> Tier {
+        let _turn = self.context.watched.plan("compiling a function");
         let program = match self.program(callback, role, schema) {
             Ok(program) => program,
             Err(reason) => return Tier::Interpreted(reason),

@@ -20,7 +20,11 @@ pub(super) struct VisitCount {
 pub(super) fn show(value: &Dynamic) -> String {
     let value = value.clone().flatten();
     if value.is_string() {
-        return format!("{:?}", value.into_string().unwrap_or_default());
+        let text = value.into_string().unwrap_or_default();
+        return match text.char_indices().nth(200) {
+            Some((end, _)) => format!("{:?}…", &text[..end]),
+            None => format!("{text:?}"),
+        };
     }
     if value.is_unit() {
         return "()".into();

@@ -22,6 +22,9 @@ use crate::shaping::{ActionSet, Dim, Scale};
 const EPISODES: u32 = 500;
 const SEEDS: u64 = 20;
 const WINDOW: u32 = 20;
+/// Variants that a study may have, and units: variants times their seeds.
+const MAX_VARIANTS: usize = 1_000;
+const MAX_UNITS: usize = 1_000_000;
 
 /// Resolves a study.
 pub(super) fn plan(
@@ -33,7 +36,13 @@ pub(super) fn plan(
     if study.experiments.is_empty() {
         return Err(Diagnostic::error("the study has no experiments").at(study.spot.place()));
     }
+    if study.experiments.len() > MAX_VARIANTS {
+        let n = study.experiments.len();
+        let d = Diagnostic::error(format!("{n} variants are too many (at most {MAX_VARIANTS})"));
+        return Err(d.at(study.spot.place()));
+    }
     let mut warnings = Vec::new();
+    let mut units = 0;
     let mut variants: Vec<Variant> = Vec::with_capacity(study.experiments.len());
     for draft in &study.experiments {
         let variant = resolver.variant(draft, &mut warnings)?;
@@ -47,6 +56,11 @@ pub(super) fn plan(
             return Err(Diagnostic::error(format!("two variants are called `{}`", variant.name))
                 .at(place)
                 .hint("give each a `name` of its own"));
+        }
+        units += variant.seeds.0.len();
+        if units > MAX_UNITS {
+            let d = Diagnostic::error(format!("more than {MAX_UNITS} variants times seeds"));
+            return Err(d.at(draft.spot.place()).hint("fewer `seeds`, or fewer variants"));
         }
         variants.push(variant);
     }

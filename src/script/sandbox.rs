@@ -7,6 +7,7 @@ use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, ImmutableString, Map, P
 
 use super::diagnostic::Diagnostic;
 use super::engine::Context;
+use super::watch::Stop;
 
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
 
@@ -22,46 +23,63 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
     function_names(engine);
 }
 
-/// Counts operations across the calls that native functions make back into the script.
+/// With fewer operations than this nothing is built that is nested deeply enough to overflow a
+/// stack.
+const HARMLESS: u64 = 2_000;
+
+/// Counts operations across the calls that native functions make back into the script, and stops it
+/// if it takes too long or too much memory. What [`stopped`] then finds in the error is which.
 fn operations(engine: &mut Engine, context: &Rc<Context>) {
     let context = context.clone();
     engine.on_progress(move |_| {
         let n = context.operations.get() + 1;
         context.operations.set(n);
-        (n > context.max_operations.get()).then_some(Dynamic::UNIT)
+        if n > context.max_operations.get() {
+            return Some(Dynamic::UNIT);
+        }
+        if n == HARMLESS {
+            context.watched.announce();
+        }
+        context.watched.stop().map(Dynamic::from)
     });
+}
+
+/// Why `operations` has stopped a script that ended with this token; `None` if it did too much.
+pub(super) fn stopped(token: &Dynamic) -> Option<Stop> {
+    token.clone().try_cast()
 }
 
 /// Closures in closures that a variable may hold, and values one may have captured by `curry`.
 const MAX_NESTING: usize = 32;
-/// Values that are looked at to find out.
-const MAX_LOOKED_AT: usize = 10_000;
+/// Closures, arrays and maps that one value may be made of, if there are closures among them: Rhai
+/// counts the elements of arrays and maps, but not what closures hold.
+const MAX_PARTS: usize = 20_000;
 
 /// Whether a variable holds a closure around closures around …: they are dropped by recursion,
-/// and 100,000 of them overflow the stack, which nothing can catch.
+/// and 100,000 of them overflow the stack, which nothing can catch. A closure can hold arrays and
+/// maps of closures, and is itself made by capturing a variable, which is shared from then on.
 pub(super) fn too_deep(value: &Dynamic) -> bool {
-    fn deep(value: &Dynamic, depth: usize, budget: &mut usize) -> bool {
-        if depth > MAX_NESTING {
-            return true;
-        }
-        if *budget == 0 {
-            return false;
-        }
-        *budget -= 1;
-        if let Some(f) = value.read_lock::<FnPtr>() {
-            return f.iter_curry().count() > MAX_NESTING
-                || f.iter_curry().any(|v| deep(v, depth + 1, budget));
-        }
-        if let Some(array) = value.read_lock::<Array>() {
-            return array.iter().any(|v| deep(v, depth + 1, budget));
-        }
-        if let Some(map) = value.read_lock::<Map>() {
-            return map.values().any(|v| deep(v, depth + 1, budget));
-        }
-        false
+    (value.is_shared() || value.is_fnptr()) && deep(value, 0, &mut { MAX_PARTS })
+}
+
+fn deep(value: &Dynamic, depth: usize, left: &mut usize) -> bool {
+    let is_fnptr = value.is_fnptr();
+    if !is_fnptr && !value.is_array() && !value.is_map() {
+        return false;
     }
-    // Only closures are looked into: arrays and maps have limits of their own, and may be large.
-    value.read_lock::<FnPtr>().is_some() && deep(value, 0, &mut { MAX_LOOKED_AT })
+    if depth > MAX_NESTING || *left == 0 {
+        return true;
+    }
+    *left -= 1;
+    if is_fnptr {
+        return value.read_lock::<FnPtr>().is_some_and(|f| {
+            f.iter_curry().count() > MAX_NESTING || f.iter_curry().any(|v| deep(v, depth + 1, left))
+        });
+    }
+    if let Some(array) = value.read_lock::<Array>() {
+        return array.iter().any(|v| deep(v, depth + 1, left));
+    }
+    value.read_lock::<Map>().is_some_and(|map| map.values().any(|v| deep(v, depth + 1, left)))
 }
 
 /// The error about it.

@@ -2,6 +2,7 @@
 //! results folder and for the worker threads, which compile it again.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -44,14 +45,23 @@ impl Source {
         if metadata.is_dir() {
             return Err(fail("is a directory, not a script".into()));
         }
+        if !metadata.is_file() {
+            return Err(fail("is no regular file, so no script".into()));
+        }
         if metadata.len() > MAX_SOURCE {
             return Err(fail(format!(
                 "{} bytes are too long for a script (at most {MAX_SOURCE})",
                 metadata.len()
             )));
         }
-        let bytes =
-            std::fs::read(path).map_err(|e| fail(format!("cannot be read: {}", plain(&e))))?;
+        let mut bytes = Vec::new();
+        // Files such as those of /proc say that they are empty.
+        std::fs::File::open(path)
+            .and_then(|file| file.take(MAX_SOURCE + 1).read_to_end(&mut bytes))
+            .map_err(|e| fail(format!("cannot be read: {}", plain(&e))))?;
+        if bytes.len() as u64 > MAX_SOURCE {
+            return Err(fail(format!("is too long for a script (at most {MAX_SOURCE} bytes)")));
+        }
         let text = String::from_utf8(bytes).map_err(|e| {
             fail(format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to()))
         })?;

@@ -6,10 +6,12 @@ mod features;
 
 use std::rc::Rc;
 
-use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, Map, NativeCallContext};
+use rhai::{Array, Dynamic, Engine, EvalAltResult, FnPtr, ImmutableString, Map, NativeCallContext};
 
 use super::diagnostic::{Diagnostic, Place};
-use super::draft::{EnvDraft, ExperimentDraft, Located, Spot, StudyDraft, captured_now, is_name};
+use super::draft::{
+    EnvDraft, ExperimentDraft, Located, Spot, StudyDraft, captured_now, is_name, notes,
+};
 use super::engine::Context;
 use super::params::{number, show, whole};
 use super::plan::GoldenBudget;
@@ -19,6 +21,9 @@ use crate::env::frozen_lake::{MAX_TILES, random_map_within};
 use crate::mdp::numpy::Seed;
 
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
+
+/// Characters of an expectation.
+const MAX_CLAIM: usize = 1_000;
 
 /// A call in progress: finds the places of the call, its arguments and their keys.
 struct Call<'a> {
@@ -139,10 +144,15 @@ fn studies(engine: &mut Engine, context: &Rc<Context>) {
         "expect",
         move |native: NativeCallContext, study: &mut StudyDraft, text: &str, check: FnPtr| {
             let call = Call::new(&c, &native);
+            if text.chars().nth(MAX_CLAIM).is_some() {
+                return call.fail(Diagnostic::error(format!(
+                    "an expectation's text has at most {MAX_CLAIM} characters"
+                )));
+            }
             let check = Located { value: captured_now(check), spot: call.arg(1) };
             let mut study = study.clone();
             study.expectations.push((text.to_string(), check));
-            study
+            Ok(study)
         },
     );
     let c = context.clone();
@@ -178,10 +188,14 @@ fn studies(engine: &mut Engine, context: &Rc<Context>) {
             Ok(StudyDraft { golden, ..study.clone() })
         },
     );
-    engine.register_fn("notes", |study: &mut StudyDraft, text: &str| StudyDraft {
-        notes: Some(text.to_string()),
-        ..study.clone()
-    });
+    let c = context.clone();
+    engine.register_fn(
+        "notes",
+        move |native: NativeCallContext, study: &mut StudyDraft, text: ImmutableString| {
+            let notes = Call::new(&c, &native).finish(notes(&text.into()))?;
+            Ok(StudyDraft { notes: Some(notes), ..study.clone() }) as Fallible<StudyDraft>
+        },
+    );
 }
 
 /// The experiments of an array.
