@@ -7,6 +7,7 @@
 mod audit;
 mod check;
 mod completions;
+mod definitions;
 mod exec;
 mod export;
 mod golden;
@@ -64,6 +65,8 @@ enum Command {
     New(new::Args),
     /// Print shell completions
     Completions(completions::Args),
+    /// Write what editors can know of scripts: definitions for language servers, snippets
+    Definitions(definitions::Args),
 }
 
 /// How a command came out.
@@ -167,5 +170,6 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
         Command::Golden(args) => golden::run(&args),
         Command::New(args) => new::run(&args),
         Command::Completions(args) => completions::run(&args),
+        Command::Definitions(args) => definitions::run(&args),
     }
 }

@@ -10,6 +10,7 @@
 
 mod builders;
 mod callback;
+pub mod definitions;
 mod diagnostic;
 mod draft;
 mod engine;
