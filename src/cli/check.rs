@@ -132,6 +132,13 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     if let Some(notes) = &v.notes {
         rows.push(("notes", notes.clone()));
     }
+    rows.extend(callbacks(v));
+    rows
+}
+
+/// The functions that shape what a variant learns from, and how each is called.
+pub(super) fn callbacks(v: &Variant) -> Vec<(&'static str, String)> {
+    let mut rows = Vec::new();
     if let Some(potential) = &v.potential {
         let on = match (&v.discretiser, v.potential_on) {
             (DiscretiserSpec::StateIndex, _) => "tabulated over the states",

@@ -2,20 +2,22 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
 use clap::Args as ClapArgs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use super::output::{diagnostic, note, out};
+use super::check::callbacks;
+use super::output::{diagnostic, note, out, palette};
 use super::{Failure, Outcome};
 use crate::experiment::{
     Audit, ExecuteError, Execution, Progress, audit_variant, check, execute, start_from,
 };
 use crate::report::claims::{judge, rehearse};
 use crate::report::closing::closing_table;
+use crate::report::curve_text::curves_text;
 use crate::report::results::{Findings, FolderError, Results};
 use crate::report::tensorboard;
 use crate::script::{Host, Plan, SeedList, load};
@@ -48,6 +50,9 @@ pub(super) struct Args {
     /// Write the course of training for TensorBoard, into the folder `tensorboard` of the results
     #[arg(long)]
     tensorboard: bool,
+    /// What `runner watch` starts: prints the curves too, and stops when stdin ends
+    #[arg(long, hide = true)]
+    watched: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -78,15 +83,25 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let host = Host::open(&plan)?;
     let audits: Vec<Audit> =
         plan.variants.iter().map(|v| audit_variant(&host, v, None)).collect::<Result<_, _>>()?;
-    let findings = results.derive(&plan, &execution, audits)?;
+    let (findings, curves) = results.derive(&plan, &execution, audits)?;
     if args.tensorboard {
         tensorboard::write(&results, &plan, &execution.units)?;
+    }
+    if args.watched {
+        let (ran, units) = (execution.finished.len(), execution.units.len());
+        out(&format!("study \"{}\": {ran} of {units} units ran\n", plan.name))?;
+        for variant in &plan.variants {
+            for line in callbacks(variant) {
+                out(&format!("  {}: {} {}\n", variant.name, line.0, line.1))?;
+            }
+        }
+        out(&format!("{}\n", curves_text(&curves, palette())))?;
     }
     if !args.quiet {
         out(&closing_table(&plan, &findings).render())?;
     }
     let held = expectations(&plan, &host, &findings, args.quiet)?;
-    if !args.quiet {
+    if !args.quiet && !args.watched {
         note(&format!("results in {}", folder.display()));
         if args.tensorboard {
             let events = folder.join(tensorboard::FOLDER);
@@ -146,6 +161,9 @@ fn train(
     });
     let total: u64 =
         plan.variants.iter().map(|v| u64::from(v.episodes) * v.seeds.0.len() as u64).sum();
+    if args.watched {
+        std::thread::spawn(|| stop_when_stdin_ends(&progress.stop));
+    }
     let bar = bar(total, args.quiet, progress);
     let result = std::thread::scope(|scope| {
         let (done, wait) = std::sync::mpsc::channel::<()>();
@@ -176,6 +194,13 @@ fn train(
             Ok(None)
         }
     }
+}
+
+/// Raises `stop` when whoever started this closes stdin, or is no more.
+fn stop_when_stdin_ends(stop: &AtomicBool) {
+    // Nothing is written to it; an error is an end too.
+    let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+    stop.store(true, Ordering::Relaxed);
 }
 
 /// The command that goes on where this one stopped.

@@ -21,6 +21,7 @@ mod score;
 mod screen;
 mod show;
 mod view;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -43,6 +44,8 @@ enum Command {
     Exec(exec::Args),
     /// Compile scripts, call every callback on sampled states, print the plan
     Check(check::Args),
+    /// Run a script again at every save, and show what came of it
+    Watch(watch::Args),
     /// Say whether each shaping keeps the optimal policy, and prove it
     Audit(audit::Args),
     /// Rank the potentials of a study before training
@@ -158,6 +161,7 @@ pub fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.command {
         Command::Exec(args) => exec::run(&args),
+        Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Audit(args) => audit::run(&args),
         Command::Score(args) => score::run(&args),

@@ -44,5 +44,5 @@ pub use plan::{
     StartModel, Variant,
 };
 pub use shaping::{AdviceOn, Shaping};
-pub use source::{Source, SourceSet};
+pub use source::{Snapshot, Source, SourceSet, snapshot};
 pub use value::Value;

@@ -85,6 +85,8 @@ fn definitions() -> String {
                 call.parameters.iter().map(|p| format!("{}: {}", p.name, p.types)).collect();
             let result = match call.result {
                 "()" => String::new(),
+                // The language server shows a choice of results as none.
+                result if result.contains(" | ") => " -> ?".into(),
                 result => format!(" -> {result}"),
             };
             let line = format!("fn {}({}){result};", function.name, parameters.join(", "));

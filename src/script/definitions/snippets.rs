@@ -93,7 +93,11 @@ fn agent(spec: &AgentSpec) -> Vec<String> {
 
 /// A builder with what its parameters are written as.
 fn called(function: &Function) -> String {
-    let Call { parameters, .. } = function.calls[0];
+    let Call { parameters, example, .. } = function.calls[0];
+    // A pattern with dots is not Rhai; the example is.
+    if parameters.iter().any(|p| p.written.contains("..")) {
+        return format!("{}$0", plain(example));
+    }
     let parameters = &parameters[usize::from(function.is_method)..];
     let stops = parameters.iter().enumerate().map(|(i, p)| {
         let quoted = p.types == "String";

@@ -11,7 +11,8 @@ const Y: Parameter = arg("y", NUMBER);
 const REAL: Call = call(&[X], "float", "");
 const TO_FLOAT: &[Call] = &[REAL];
 /// Of a number, one of its own type.
-const SAME: &[Call] = &[call(&[X], NUMBER, "")];
+const SAME: &[Call] =
+    &[call(&[arg("x", "int")], "int", ""), call(&[arg("x", "float")], "float", "")];
 /// Of a float alone.
 const OF_FLOAT: &[Call] = &[call(&[arg("x", "float")], "float", "")];
 const TEST: &[Call] = &[call(&[X], "bool", "")];
