@@ -32,7 +32,7 @@ struct Cell {
 
 /// The plot as text, each line ended by a newline. Deterministic.
 pub fn curves_text(plot: &CurvesPlot, ink: Palette) -> String {
-    let (low, high, _) = value_range(plot);
+    let (low, high, _) = value_range(&without_bands(plot));
     let last = plot.curves.iter().filter_map(|c| c.band.episode.last()).max().map_or(1, |&n| n);
     let y = Scale { low, high, from: (TALL * DOTS[1] - 1) as f64, to: 0.0 };
     let mut panel = vec![[Cell::default(); WIDE]; TALL];
@@ -83,6 +83,17 @@ pub fn curves_text(plot: &CurvesPlot, ink: Palette) -> String {
     let _ = writeln!(out, "{} └{}", " ".repeat(margin), "─".repeat(WIDE));
     let _ = writeln!(out, "{}  {first}{}{last}", " ".repeat(margin), " ".repeat(gap));
     out
+}
+
+/// The plot as it is drawn here: the means alone, so that wide bands take no room.
+fn without_bands(plot: &CurvesPlot) -> CurvesPlot {
+    let mut plot = plot.clone();
+    for Curve { band, .. } in &mut plot.curves {
+        for line in [&mut band.iqm, &mut band.low, &mut band.high] {
+            line.clone_from(&band.mean);
+        }
+    }
+    plot
 }
 
 /// Draws a curve; the row in which it ends, if it has a finite point in the panel.

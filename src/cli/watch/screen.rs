@@ -104,6 +104,11 @@ impl Screen {
         if text.lines().count() <= room {
             return text.into();
         }
+        // The table comes last, behind a blank line, and says most.
+        let text = text.rsplit_once("\n\n").map_or(text, |(_, table)| table);
+        if text.lines().count() <= room {
+            return text.into();
+        }
         let lines: Vec<&str> = text.lines().take(room).chain(["…", ""]).collect();
         lines.join("\n")
     }
