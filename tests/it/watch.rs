@@ -121,8 +121,8 @@ fn every_save_is_run_and_a_mistake_leaves_the_last_result() {
 #[cfg(unix)]
 fn imports_are_watched_however_they_are_saved() {
     let dir = folder();
-    let importing = "import \"lib/shapes\" as shapes;\n".to_string()
-        + &SMALL.replace("sin(3.0 * s.position)", "shapes::height(s)");
+    let calling = SMALL.replace("sin(3.0 * s.position)", "shapes::height(s)");
+    let importing = format!("import \"lib/shapes\" as shapes;\n{calling}");
     let script = write(dir.path(), "small.rhai", &importing);
     let watcher = Watcher::start(&script, &dir.path().join("results"));
     // It is missing, and then it is there.
