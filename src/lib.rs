@@ -15,6 +15,7 @@
 //! | [`learn`] | agents and planners |
 //! | [`nn`] | small networks and what trains them |
 //! | [`shaping`] | rewards, potentials, discretisers |
+//! | [`jit`] | callbacks as programs of an intermediate form, and as machine code |
 //! | [`render`] | scenes as pixels, GIFs, characters |
 //! | [`mod@env`] | the environments and their registry |
 //! | [`mdp`] | actions, steps, models, random streams, pinned mathematics |
@@ -23,6 +24,7 @@ pub mod audit;
 pub mod cli;
 pub mod env;
 pub mod experiment;
+pub mod jit;
 pub mod learn;
 pub mod mdp;
 pub mod nn;

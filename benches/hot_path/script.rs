@@ -6,7 +6,7 @@ use divan::{Bencher, black_box};
 use runner::env::cart_pole::CartPole;
 use runner::mdp::Env;
 use runner::script::{DiscretiserSpec, Host, Plan, load};
-use runner::shaping::Transition;
+use runner::shaping::{RewardModel, Transition};
 
 const SCRIPT: &str = r#"
 fn upright(s) { -20.0 * abs(s.theta) - 2.0 * abs(s.theta_dot + 4.0 * s.theta) }
@@ -62,7 +62,7 @@ fn call_potential(bencher: Bencher) {
     let host = host(&plan);
     let callback = plan.variants[0].potential.as_ref().expect("the script has one");
     let mut phi = host.callbacks().potential(callback, &CartPole::new(false).schema());
-    bencher.bench_local(|| phi(black_box(&FIELDS), 1).expect("a number"));
+    bencher.bench_local(|| phi.at(black_box(&FIELDS), 1).expect("a number"));
 }
 
 #[divan::bench]
@@ -73,7 +73,7 @@ fn call_discretiser(bencher: Bencher) {
         unreachable!("the script's discretiser is its own");
     };
     let mut cells = host.callbacks().cells(cell, shape, &[], &CartPole::new(false).schema());
-    bencher.bench_local(|| cells(black_box(&FIELDS)).expect("a cell"));
+    bencher.bench_local(|| cells.at(black_box(&FIELDS)).expect("a cell"));
 }
 
 #[divan::bench]
@@ -94,6 +94,6 @@ fn call_reward(bencher: Bencher) {
             truncated: false,
             step: 3,
         };
-        reward(&env, &t, &mut []).expect("a number")
+        reward.reward(&env, &t, &mut []).expect("a number")
     });
 }

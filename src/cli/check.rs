@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 
 use super::output::{diagnostic, note, out};
 use super::{Failure, Outcome};
-use crate::experiment::check;
+use crate::experiment::{CallbackTier, Checked, check};
 use crate::report::claims::rehearse;
 use crate::script::{AdviceOn, Callback, Diagnostic, DiscretiserSpec, PhiOn, Plan, Variant, load};
 
@@ -23,14 +23,14 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut last = None;
     for script in &args.scripts {
         match checked(script) {
-            Ok((plan, printed)) => {
+            Ok((plan, checked)) => {
                 for warning in &plan.warnings {
                     diagnostic(warning);
                 }
-                for line in plan.printed.iter().chain(&printed) {
+                for line in plan.printed.iter().chain(&checked.printed) {
                     note(line);
                 }
-                out(&describe(&plan))?;
+                out(&describe(&plan, &checked.tiers))?;
             }
             Err(d) => {
                 if let Some(earlier) = last.replace(d) {
@@ -45,18 +45,18 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
 }
 
-/// A script's plan, and what its callbacks printed while they were tried out.
-fn checked(script: &Path) -> Result<(Plan, Vec<String>), Diagnostic> {
+/// A script's plan, and what trying its callbacks out has brought to light.
+fn checked(script: &Path) -> Result<(Plan, Checked), Diagnostic> {
     let plan = load(script)?;
-    let printed = check(&plan)?;
+    let checked = check(&plan)?;
     rehearse(&plan)?;
-    Ok((plan, printed))
+    Ok((plan, checked))
 }
 
 const MEMORY: &str = "writing to a string does not fail";
 
-/// The plan in words.
-fn describe(plan: &Plan) -> String {
+/// The plan in words; `tiers` says how each variant's callbacks are run.
+fn describe(plan: &Plan, tiers: &[Vec<CallbackTier>]) -> String {
     let mut text = String::new();
     let units: usize = plan.variants.iter().map(|v| v.seeds.0.len()).sum();
     writeln!(
@@ -68,9 +68,9 @@ fn describe(plan: &Plan) -> String {
         counted(units, "unit"),
     )
     .expect(MEMORY);
-    for variant in &plan.variants {
+    for (variant, tiers) in plan.variants.iter().zip(tiers) {
         writeln!(text, "  {}", variant.name).expect(MEMORY);
-        for (what, how) in rows(variant) {
+        for (what, how) in rows(variant).into_iter().chain(runs(tiers)) {
             writeln!(text, "    {what:<12} {how}").expect(MEMORY);
         }
     }
@@ -81,6 +81,18 @@ fn describe(plan: &Plan) -> String {
         writeln!(text, "  expects: {}", expectation.text).expect(MEMORY);
     }
     text
+}
+
+/// Which callbacks are machine code, and why the others are not.
+fn runs(tiers: &[CallbackTier]) -> Vec<(&'static str, String)> {
+    let (native, others): (Vec<_>, Vec<_>) = tiers.iter().partition(|t| t.is_native);
+    let mut rows = Vec::new();
+    if !native.is_empty() {
+        let keys: Vec<&str> = native.iter().map(|t| t.key.as_str()).collect();
+        rows.push(("native", keys.join(", ")));
+    }
+    rows.extend(others.iter().map(|t| ("not native", format!("{}: {}", t.key, t.how))));
+    rows
 }
 
 fn rows(v: &Variant) -> Vec<(&'static str, String)> {
@@ -143,11 +155,11 @@ pub(super) fn callbacks(v: &Variant) -> Vec<(&'static str, String)> {
         let on = match (&v.discretiser, v.potential_on) {
             (DiscretiserSpec::StateIndex, _) => "tabulated over the states",
             (DiscretiserSpec::Features(_) | DiscretiserSpec::Raw, _) => {
-                "on the state itself, interpreted at every step: keeps the optimal policy, \
+                "on the state itself, at every step: keeps the optimal policy, \
                  equals no initial values"
             }
             (_, PhiOn::Cell) => "once per cell, on its representative",
-            (_, PhiOn::Raw) => "on the raw state, interpreted at every step",
+            (_, PhiOn::Raw) => "on the raw state, at every step",
         };
         let on = if v.is_dynamic() { format!("of every episode, {on}") } else { on.into() };
         rows.push(("potential", format!("{}, {on}", at(potential))));

@@ -1,5 +1,6 @@
 //! `runner exec SCRIPT`
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -62,8 +63,18 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         start_from(&mut plan, model)?;
     }
     say(&plan, args.quiet);
-    for line in check(&plan)? {
-        note(&line);
+    let checked = check(&plan)?;
+    for line in &checked.printed {
+        note(line);
+    }
+    if !args.quiet {
+        // Variants that share a callback say it once.
+        let slow = checked.tiers.iter().flatten().filter(|tier| tier.is_slow);
+        let lines: BTreeSet<String> =
+            slow.map(|tier| format!("note: `{}` is not native: {}", tier.key, tier.how)).collect();
+        for line in &lines {
+            note(line);
+        }
     }
     rehearse(&plan)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("results").join(&plan.name));

@@ -34,6 +34,9 @@ use crate::script::Diagnostic;
 #[derive(Debug, Parser)]
 #[command(name = "runner", version, about, arg_required_else_help = true)]
 struct Cli {
+    /// Interpret all callbacks of scripts: slower, with the same results
+    #[arg(long, global = true)]
+    no_jit: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -159,6 +162,9 @@ pub fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<Outcome, Failure> {
+    if cli.no_jit {
+        crate::jit::disable();
+    }
     match cli.command {
         Command::Exec(args) => exec::run(&args),
         Command::Watch(args) => watch::run(&args),

@@ -141,7 +141,7 @@ pub(super) fn scripted_reward<E: Env>(host: &Host, variant: &Variant, env: &E) -
     }
     let terms: Vec<Callback> = variant.terms.values().cloned().collect();
     let reward = host.callbacks().reward(variant.reward.as_ref(), &terms, &env.schema());
-    AnyReward::Scripted(ScriptedReward::<E>(reward))
+    AnyReward::Scripted(reward)
 }
 
 /// A variant's reward model. On finite environments it is tabulated, unless it reads `t.step`.

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
+use super::tiers::{CallbackTier, tiers};
 use super::unit::{UnitError, run_unit};
 use crate::script::{Diagnostic, Host, Plan, Variant};
 
@@ -9,12 +10,21 @@ use crate::script::{Diagnostic, Host, Plan, Variant};
 const EPISODES: u32 = 5;
 const STEPS: u32 = 200;
 
+/// What trying the callbacks out has brought to light.
+#[derive(Debug)]
+pub struct Checked {
+    /// What they printed.
+    pub printed: Vec<String>,
+    /// How they are run, variant by variant.
+    pub tiers: Vec<Vec<CallbackTier>>,
+}
+
 /// Plays a few short episodes of every variant, so that every callback is called on states that
-/// occur; on finite environments on all of them. Returns what they printed.
+/// occur; on finite environments on all of them.
 ///
 /// # Errors
 /// The first mistake found.
-pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
+pub fn check(plan: &Plan) -> Result<Checked, Diagnostic> {
     let host = Host::open(plan)?;
     for variant in &plan.variants {
         let scripted = variant.is_shaped()
@@ -22,8 +32,6 @@ pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
             || !variant.agent_functions.is_empty()
             || variant.reward.is_some()
             || !variant.terms.is_empty()
-            || variant.allowed.is_some()
-            || !variant.agent_functions.is_empty()
             || matches!(variant.discretiser, crate::script::DiscretiserSpec::Cells { .. });
         if !scripted {
             continue;
@@ -39,5 +47,6 @@ pub fn check(plan: &Plan) -> Result<Vec<String>, Diagnostic> {
             Err(UnitError::Script(d) | UnitError::Diverged(d, _)) => return Err(*d),
         }
     }
-    Ok(host.printed())
+    let tiers = plan.variants.iter().map(|variant| tiers(&host, variant));
+    Ok(Checked { tiers: tiers.collect::<Result<_, _>>()?, printed: host.printed() })
 }

@@ -42,7 +42,7 @@ impl Locate {
         match self {
             Self::Index => Ok(session.state_index().expect("only for finite environments")),
             Self::Bins(bins) => Ok(bins.index(session.fields())),
-            Self::Cells(cell) => cell(session.fields()),
+            Self::Cells(cell) => cell.at(session.fields()),
         }
     }
 }
@@ -206,7 +206,7 @@ impl Landscape {
     pub fn allowed(&mut self) -> Option<Vec<ActionSet>> {
         let (shield, states) = (self.shield.as_mut()?, self.states.as_ref()?);
         let mut allowed = |s: &ListedState| {
-            if s.acts { shield(&s.fields).unwrap_or(ActionSet::ALL) } else { ActionSet::ALL }
+            if s.acts { shield.at(&s.fields).unwrap_or(ActionSet::ALL) } else { ActionSet::ALL }
         };
         Some(states.iter().map(&mut allowed).collect())
     }
@@ -225,7 +225,7 @@ impl Landscape {
         match &mut self.locate {
             None | Some(Locate::Index) => Ok(None),
             Some(Locate::Bins(bins)) => Ok(Some(bins.index(fields))),
-            Some(Locate::Cells(cell)) => cell(fields).map(Some).map_err(diagnostic_of),
+            Some(Locate::Cells(cell)) => cell.at(fields).map(Some).map_err(diagnostic_of),
         }
     }
 
@@ -250,7 +250,7 @@ impl Landscape {
             }
             _ => state[..n_fields].copy_from_slice(fields),
         }
-        phi(&state[..n_fields], episode).map(Some).map_err(diagnostic_of)
+        phi.at(&state[..n_fields], episode).map(Some).map_err(diagnostic_of)
     }
 }
 

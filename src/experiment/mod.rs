@@ -27,6 +27,7 @@ mod shaped;
 mod shielded;
 mod starts;
 mod store;
+mod tiers;
 mod train;
 mod unit;
 
@@ -43,7 +44,7 @@ pub use audit::{
     Audit, AuditVerdict, Continuous, Exact, Naming, SampledModel, Thorough, TrueReturn,
     audit_variant,
 };
-pub use check::check;
+pub use check::{Checked, check};
 pub use execute::{ExecuteError, Execution, Finished, Progress, execute};
 pub use further::start_from;
 pub use interrupted::Resumable;
@@ -55,5 +56,6 @@ pub use store::{
     Checkpoint, Model, Store, StoreError, StoredUnit, holds_model, holds_weights, read_model,
     read_table, read_weights, write_atomically, write_atomically_with,
 };
+pub use tiers::{CallbackTier, tiers};
 pub use train::{Limits, Solved, TrainError, World, train};
 pub use unit::{SEMANTICS, Unit, UnitError, resume_unit, run_unit, units};

@@ -71,7 +71,7 @@ impl Policy {
         if session.elapsed().is_multiple_of(self.frame_skip) {
             let failed = |f: Fault| RolloutError::Policy(f.0);
             let allowed = match &mut self.shield {
-                Some(shield) => shield(session.fields()).map_err(failed)?,
+                Some(shield) => shield.at(session.fields()).map_err(failed)?,
                 None => ActionSet::ALL,
             };
             let row = self.values.present(session).map_err(failed)?;

@@ -15,11 +15,9 @@ use crate::shaping::{
 pub(super) fn phi(host: &Host, variant: &Variant, schema: &Schema) -> Option<PhiFn> {
     let shift = variant.shaping.shift;
     let Some(callback) = &variant.potential else {
-        let constant: PhiFn = Box::new(move |_, _| Ok(shift));
-        return (shift != 0.0).then_some(constant);
+        return (shift != 0.0).then(|| PhiFn::new(move |_, _| Ok(shift)));
     };
-    let mut phi = host.callbacks().potential(callback, schema);
-    Some(Box::new(move |fields, episode| Ok(phi(fields, episode)? + shift)))
+    Some(host.callbacks().potential(callback, schema).shifted(shift))
 }
 
 /// How a variant's potential is evaluated: on the states themselves, on bin centres, or raw.
@@ -46,7 +44,7 @@ pub(super) fn potential<E: Env + Clone + 'static>(
     let Some(fields_of) = fields_of else {
         return Ok(AnyPotential::Raw(RawPotential::new(n_fields, phi)));
     };
-    let mut at = move |cell: usize, episode| phi(&fields_of(cell)[..n_fields], episode);
+    let mut at = move |cell: usize, episode| phi.at(&fields_of(cell)[..n_fields], episode);
     if variant.is_dynamic() {
         return Ok(AnyPotential::Episode(EpisodePotential::new(n_cells, Box::new(at))));
     }

@@ -1,6 +1,7 @@
 //! Calling script functions while training.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use rhai::{AST, CallFnOptions, Dynamic, Engine, FnPtr, Scope};
@@ -8,13 +9,17 @@ use rhai::{AST, CallFnOptions, Dynamic, Engine, FnPtr, Scope};
 use super::diagnostic::{Diagnostic, Place};
 use super::engine::{CALLBACK_OPERATIONS, Context};
 use super::errors::diagnostic;
+use super::lower::Library;
+use super::native::{Role, Tier};
 use super::params::show;
 use super::plan::Callback;
 use super::record;
 use super::state::{State, StepView};
+use super::value::Value;
 use crate::mdp::{Action, Env, Schema};
 use crate::shaping::{
-    ActionFn, ActionSet, CellFn, Fault, MAX_FIELDS, PhiFn, RewardFn, Scale, ShieldFn,
+    ActionFn, ActionSet, CellFn, Fault, MAX_FIELDS, PhiFn, Scale, ScriptedReward, ShieldFn, StepFn,
+    Transition,
 };
 
 fn fault(diagnostic: Diagnostic) -> Fault {
@@ -22,9 +27,26 @@ fn fault(diagnostic: Diagnostic) -> Fault {
 }
 
 /// A callback, ready to be called.
-struct Prepared {
-    callback: Callback,
+pub(super) struct Prepared {
+    pub(super) callback: Callback,
     captures: Vec<Dynamic>,
+}
+
+#[cfg(test)]
+impl Prepared {
+    /// The function `name`, without captured values.
+    pub(super) fn named(name: &str) -> Self {
+        let callback = Callback {
+            function: name.into(),
+            captures: Vec::new(),
+            arity: 1,
+            label: name.into(),
+            place: None,
+            digest: String::new(),
+            tier: super::native::TierCell::default(),
+        };
+        Self { callback, captures: Vec::new() }
+    }
 }
 
 /// One thread's compiled script, ready to be called.
@@ -32,15 +54,25 @@ pub struct Callbacks {
     pub(super) engine: Engine,
     pub(super) ast: AST,
     pub(super) context: Rc<Context>,
+    /// The script's constants, which its functions see.
+    pub(super) constants: BTreeMap<String, Value>,
+    /// Its functions and those of its modules, once a callback is to be lowered.
+    pub(super) library: OnceCell<Library>,
     scope: RefCell<Scope<'static>>,
 }
 
 impl Callbacks {
-    pub(super) fn new(mut engine: Engine, ast: AST, context: Rc<Context>) -> Rc<Self> {
+    pub(super) fn new(
+        mut engine: Engine,
+        ast: AST,
+        context: Rc<Context>,
+        constants: BTreeMap<String, Value>,
+    ) -> Rc<Self> {
         engine.set_max_operations(CALLBACK_OPERATIONS);
         context.operations.set(0);
         context.max_operations.set(CALLBACK_OPERATIONS);
-        Rc::new(Self { engine, ast, context, scope: RefCell::new(Scope::new()) })
+        let (library, scope) = (OnceCell::new(), RefCell::new(Scope::new()));
+        Rc::new(Self { engine, ast, context, constants, library, scope })
     }
 
     /// The function called `name`, as a value.
@@ -57,7 +89,7 @@ impl Callbacks {
 
     /// Calls `callback` with `given` after its captured values, which it gets as copies: what it
     /// does to them is forgotten.
-    fn call<const N: usize>(
+    pub(super) fn call<const N: usize>(
         &self,
         callback: &Prepared,
         given: [Dynamic; N],
@@ -122,9 +154,11 @@ impl Callbacks {
     /// `callback` as a potential of the state's fields, and of the episode if it takes two
     /// arguments.
     pub fn potential(self: &Rc<Self>, callback: &Callback, schema: &Schema) -> PhiFn {
+        let kernel = self.number_kernel(callback, Role::Potential, schema);
+        let of_episode = callback.arity == 2;
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
-        Box::new(move |fields, episode| {
+        let script = move |fields: &[f64], episode: u32| {
             let state = State::new(&schema, fields);
             let s = Dynamic::from(state.clone());
             let number = if callback.callback.arity == 1 {
@@ -135,7 +169,8 @@ impl Callbacks {
                     .map_err(|d| d.note(format!("for episode {episode}")))
             };
             number.map_err(fault)
-        })
+        };
+        PhiFn::new(script).with_kernel(kernel, of_episode)
     }
 
     /// `callback` as a number of a state and an action, called `what` in messages; of the state
@@ -146,9 +181,19 @@ impl Callbacks {
         what: &'static str,
         schema: &Schema,
     ) -> ActionFn {
+        let kernel = self.number_kernel(callback, Role::OfAction, schema);
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
         Box::new(move |fields, action| {
+            if let Some(kernel) = &kernel {
+                let mut inputs = [0.0; MAX_FIELDS + 1];
+                inputs[..fields.len()].copy_from_slice(fields);
+                inputs[fields.len()] = action as f64;
+                let number = kernel.call(&inputs[..=fields.len()]);
+                if number.is_finite() {
+                    return Ok(number);
+                }
+            }
             let state = State::new(&schema, fields);
             let s = Dynamic::from(state.clone());
             let number = if callback.callback.arity == 1 {
@@ -168,9 +213,16 @@ impl Callbacks {
         n_actions: usize,
         schema: &Schema,
     ) -> impl FnMut(&[f64]) -> Result<Action, Fault> + use<> {
+        let kernel = self.integer_kernel(callback, Role::Policy, schema);
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
         move |fields| {
+            let compiled = kernel.as_ref().map(|kernel| kernel.call(fields));
+            if let Some(Ok(action)) = compiled.map(usize::try_from)
+                && action < n_actions
+            {
+                return Ok(action);
+            }
             let state = State::new(&schema, fields);
             let on = || format!("on the state {}", state.describe());
             let given = [Dynamic::from(state.clone())];
@@ -196,9 +248,10 @@ impl Callbacks {
         n_actions: usize,
         schema: &Schema,
     ) -> ShieldFn {
+        let kernel = self.integer_kernel(callback, Role::Shield, schema);
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
-        Box::new(move |fields| {
+        let script = move |fields: &[f64]| {
             let state = State::new(&schema, fields);
             let on = || format!("on the state {}", state.describe());
             let mut allowed = 0;
@@ -225,7 +278,8 @@ impl Callbacks {
                 return Err(fault(host.annotate(d.hint("allow at least one action everywhere"))));
             }
             Ok(ActionSet(allowed))
-        })
+        };
+        ShieldFn::new(script).with_kernel(kernel, n_actions)
     }
 
     /// `callback` as a discretiser into a table of the given shape; it sees the fields that
@@ -237,14 +291,11 @@ impl Callbacks {
         scales: &[Scale],
         schema: &Schema,
     ) -> CellFn {
+        let kernel = self.integer_kernel(callback, Role::Cells(shape), schema);
         let (host, callback, schema) =
             (self.clone(), self.prepare(callback), Rc::new(schema.clone()));
-        let (shape, scales) = (shape.to_vec(), scales.to_vec());
-        Box::new(move |fields| {
-            let mut shown = [0.0; MAX_FIELDS];
-            let shown = &mut shown[..fields.len()];
-            shown.copy_from_slice(fields);
-            Scale::show_all(&scales, shown);
+        let shape = shape.to_vec();
+        let script = move |shown: &[f64]| {
             let state = State::new(&schema, shown);
             let result = host.call(&callback, [Dynamic::from(state.clone())]);
             result
@@ -252,7 +303,8 @@ impl Callbacks {
                     cell_index(&value, &shape, &callback.callback).map_err(|d| host.annotate(d))
                 })
                 .map_err(|d| fault(d.note(format!("on the state {}", state.describe()))))
-        })
+        };
+        CellFn::new(scales, script).with_kernel(kernel)
     }
 
     /// `reward` (the native one if `None`) plus `terms`, as a reward model.
@@ -261,12 +313,28 @@ impl Callbacks {
         reward: Option<&Callback>,
         terms: &[Callback],
         schema: &Schema,
-    ) -> RewardFn<E> {
-        let (host, schema) = (self.clone(), Rc::new(schema.clone()));
-        let reward = reward.map(|callback| self.prepare(callback));
-        let terms: Vec<Prepared> = terms.iter().map(|callback| self.prepare(callback)).collect();
+    ) -> ScriptedReward<E> {
+        let schema = Rc::new(schema.clone());
+        let reward = reward.map(|callback| self.of_step(callback, "the reward", &schema));
+        let terms = terms.iter().map(|callback| self.of_step(callback, "the term", &schema));
+        ScriptedReward::new(reward, terms.collect(), schema.fields.len())
+    }
+
+    /// `callback` as a number of a step, called `what` in messages.
+    fn of_step<E: Env>(
+        self: &Rc<Self>,
+        callback: &Callback,
+        what: &'static str,
+        schema: &Rc<Schema>,
+    ) -> StepFn<E> {
+        let kernel = match self.tier(callback, Role::OfStep, schema) {
+            // Whoever tabulates a reward asks whether it has read `t.step`, which code does not say.
+            Tier::Number(kernel, reads_step) if !(E::INDEXED && reads_step) => Some(kernel),
+            _ => None,
+        };
+        let (host, callback, schema) = (self.clone(), self.prepare(callback), schema.clone());
         let n_fields = schema.fields.len();
-        Box::new(move |env, t, sums| {
+        let script = move |env: &E, t: &Transition<'_, E::Obs>| {
             let view = |obs: &E::Obs| {
                 let mut fields = [0.0; MAX_FIELDS];
                 env.fields(obs, &mut fields);
@@ -281,27 +349,11 @@ impl Callbacks {
                 truncated: t.truncated,
                 step: i64::from(t.step),
             };
-            let call = |callback: &Prepared, what: &str| {
-                let arg = Dynamic::from(step.clone());
-                host.number(callback, what, [arg], &step.state).map_err(|d| {
-                    fault(d.note(format!(
-                        "action {}, to {}",
-                        step.action,
-                        step.next_state.describe()
-                    )))
-                })
-            };
-            let mut total = match &reward {
-                Some(callback) => call(callback, "the reward")?,
-                None => t.reward,
-            };
-            for (sum, callback) in sums.iter_mut().zip(&terms) {
-                let term = call(callback, "the term")?;
-                *sum += term;
-                total += term;
-            }
-            Ok(total)
-        })
+            host.number(&callback, what, [Dynamic::from(step.clone())], &step.state).map_err(|d| {
+                fault(d.note(format!("action {}, to {}", step.action, step.next_state.describe())))
+            })
+        };
+        StepFn::new(script).with_kernel(kernel)
     }
 
     /// The numbers of real-valued action `index`.
@@ -360,7 +412,11 @@ fn called(schema: &Schema, action: usize) -> String {
 }
 
 /// The row-major index of what a scripted discretiser returned.
-fn cell_index(value: &Dynamic, shape: &[usize], callback: &Callback) -> Result<usize, Diagnostic> {
+pub(super) fn cell_index(
+    value: &Dynamic,
+    shape: &[usize],
+    callback: &Callback,
+) -> Result<usize, Diagnostic> {
     let wrong = |d: Diagnostic| Err(d.at(callback.place.clone()));
     let indices: Option<Vec<i64>> = match value.read_lock::<rhai::Array>() {
         Some(list) => list.iter().map(|v| v.as_int().ok()).collect(),

@@ -33,6 +33,8 @@ pub(super) struct Context {
     pub(super) constants: RefCell<BTreeMap<String, Dynamic>>,
     /// Modules by their path relative to the script's folder.
     pub(super) modules: RefCell<BTreeMap<String, Shared<Module>>>,
+    /// Their syntax trees.
+    pub(super) trees: RefCell<BTreeMap<String, rhai::AST>>,
     /// Files being loaded, to catch imports that run in a circle.
     loading: RefCell<Vec<String>>,
     pub(super) printed: RefCell<Vec<String>>,
@@ -52,6 +54,7 @@ impl Context {
             syntax: RefCell::default(),
             constants: RefCell::default(),
             modules: RefCell::default(),
+            trees: RefCell::default(),
             loading: RefCell::default(),
             printed: RefCell::default(),
             step_read: Rc::default(),
@@ -244,8 +247,10 @@ impl Imports {
         }
         context.loading.borrow_mut().push(key.clone());
         let module = compile(engine, context, &source.name, &source.text).and_then(|ast| {
-            Module::eval_ast_as_new(Scope::new(), &ast, engine)
-                .map_err(|e| super::errors::diagnostic(context, &e, Some(&source.name)))
+            let module = Module::eval_ast_as_new(Scope::new(), &ast, engine)
+                .map_err(|e| super::errors::diagnostic(context, &e, Some(&source.name)))?;
+            context.trees.borrow_mut().insert(key.clone(), ast);
+            Ok(module)
         });
         context.loading.borrow_mut().pop();
         let module: Shared<Module> = module?.into();

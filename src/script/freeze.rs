@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::diagnostic::Diagnostic;
 use super::draft::Located;
+use super::native::TierCell;
 use super::plan::Callback;
 use super::resolve::Resolver;
 use super::source::{hex, tokens};
@@ -79,7 +80,8 @@ impl Resolver<'_> {
             )));
         };
         let digest = self.digest(name, &captures, &mut Vec::new());
-        Ok(Callback { function: name.to_string(), captures, arity, label, place, digest })
+        let tier = TierCell::default();
+        Ok(Callback { function: name.to_string(), captures, arity, label, place, digest, tier })
     }
 
     /// Hashes everything that can change the function's results. Reachability goes by names, which

@@ -49,7 +49,7 @@ pub(super) fn load_sources(sources: SourceSet, name: &str) -> Result<Plan, Diagn
         }
     }
     let study = study(value, name).map_err(|d| context.sources.borrow().annotate(d))?;
-    let callbacks = Callbacks::new(engine, ast, context.clone());
+    let callbacks = Callbacks::new(engine, ast, context.clone(), constants.clone());
     resolve::plan(study, constants, &callbacks).map_err(|d| context.sources.borrow().annotate(d))
 }
 
@@ -110,7 +110,7 @@ impl Host {
             let module = context.modules.borrow()[&key].clone();
             engine.register_static_module(alias, module);
         }
-        let callbacks = Callbacks::new(engine, ast, context.clone());
+        let callbacks = Callbacks::new(engine, ast, context.clone(), plan.constants.clone());
         let function = |name: &str| callbacks.function(name);
         let constants = plan.constants.iter().map(|(k, v)| (k.clone(), v.thaw(&function)));
         *context.constants.borrow_mut() = constants.collect();

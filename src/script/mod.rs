@@ -5,7 +5,9 @@
 //! - [`Diagnostic`]: a mistake, with its file, line, column and a suggestion
 //! - [`Value`]: what callbacks may capture; plain data that can cross threads and be hashed
 //!
-//! All contact with Rhai's syntax tree is in `syntax`, all limits are in `engine`, every function
+//! - [`Tier`]: a callback is run as machine code, or by the interpreter
+//!
+//! All contact with Rhai's syntax tree is in `syntax` and `lower`, all limits are in `engine`, every function
 //! that scripts can call is listed in [`functions`], every key of an experiment in [`keys`].
 
 mod builders;
@@ -20,6 +22,8 @@ mod freeze;
 pub mod functions;
 mod host;
 pub mod keys;
+mod lower;
+mod native;
 mod network;
 mod numeric;
 mod params;
@@ -39,6 +43,7 @@ pub use callback::Callbacks;
 pub(crate) use diagnostic::suggest;
 pub use diagnostic::{Diagnostic, Place, Severity};
 pub use host::{Host, load};
+pub use native::{Reason, Tier, Tiered};
 pub use plan::{
     Callback, DiscretiserSpec, Expectation, GoldenBudget, PhiOn, Plan, SeedList, StartFile,
     StartModel, Variant,

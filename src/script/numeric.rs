@@ -9,6 +9,7 @@
 
 use rhai::{Engine, EvalAltResult, Position};
 
+use crate::jit::math::UNARY;
 use crate::mdp::math;
 
 type Fallible<T> = Result<T, Box<EvalAltResult>>;
@@ -16,30 +17,6 @@ type Fallible<T> = Result<T, Box<EvalAltResult>>;
 fn arithmetic<T>(message: &str) -> Fallible<T> {
     Err(Box::new(EvalAltResult::ErrorArithmetic(message.into(), Position::NONE)))
 }
-
-type Unary = fn(f64) -> f64;
-
-/// Functions of one float that are registered under their own names, for integers as well.
-const UNARY: &[(&str, Unary)] = &[
-    ("sin", math::sin),
-    ("cos", math::cos),
-    ("tan", math::tan),
-    ("asin", math::asin),
-    ("acos", math::acos),
-    ("atan", math::atan),
-    ("sinh", math::sinh),
-    ("cosh", math::cosh),
-    ("tanh", math::tanh),
-    ("asinh", math::asinh),
-    ("acosh", math::acosh),
-    ("atanh", math::atanh),
-    ("exp", math::exp),
-    ("ln", math::ln),
-    ("log", math::log10),
-    ("sqrt", f64::sqrt),
-    ("to_radians", f64::to_radians),
-    ("to_degrees", f64::to_degrees),
-];
 
 /// Registers operators and functions on numbers.
 pub(super) fn register(engine: &mut Engine) {
@@ -63,7 +40,7 @@ fn comparisons(engine: &mut Engine) {
 
 fn mathematics(engine: &mut Engine) {
     for &(name, f) in UNARY {
-        engine.register_fn(name, f);
+        engine.register_fn(name, move |x: f64| f(x));
         engine.register_fn(name, move |x: i64| f(x as f64));
     }
     engine.register_fn("atan", math::atan2);

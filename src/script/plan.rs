@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::{Map, Value as Json};
 
 use super::diagnostic::{Diagnostic, Place};
+use super::native::TierCell;
 use super::shaping::Shaping;
 use super::source::SourceSet;
 use super::value::Value;
@@ -32,6 +33,8 @@ pub struct Callback {
     /// comments and formatting) and of the functions it can reach, captured values, constants,
     /// imports.
     pub digest: String,
+    /// How it is run.
+    pub(super) tier: TierCell,
 }
 
 impl Callback {

@@ -197,7 +197,7 @@ fn beginning(path: &Path) -> Option<Vec<u8>> {
 }
 
 /// `path` seen from the file `from`, normalised, with `.rhai` added if it has no extension.
-fn resolve_import(from: Option<&str>, path: &str) -> Result<String, Diagnostic> {
+pub(super) fn resolve_import(from: Option<&str>, path: &str) -> Result<String, Diagnostic> {
     let outside = || {
         Diagnostic::error(format!("import `{path}` leads out of the script's folder"))
             .hint("a script may import files beside it and below it only")

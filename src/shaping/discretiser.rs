@@ -1,7 +1,7 @@
 //! Observation → what the agent sees: a row of a table, with the actions allowed there, or the
 //! state's numbers.
 
-use super::{Bins, Fault, MAX_FIELDS};
+use super::{Bins, CellFn, Fault, MAX_FIELDS, ShieldFn};
 use crate::mdp::{Action, Env};
 
 /// A state as an agent sees it.
@@ -148,9 +148,6 @@ impl<E: Env> Discretiser<E> for StateIndex {
     }
 }
 
-/// A function from the state's fields to a cell.
-pub type CellFn = Box<dyn FnMut(&[f64]) -> Result<usize, Fault>>;
-
 /// A scripted discretiser. The function itself refuses indices outside the table.
 pub struct ScriptedCells {
     n_cells: usize,
@@ -178,7 +175,7 @@ impl<E: Env> Discretiser<E> for ScriptedCells {
     fn see(&mut self, env: &E, obs: &E::Obs) -> Result<usize, Fault> {
         let mut fields = [0.0; MAX_FIELDS];
         env.fields(obs, &mut fields);
-        (self.cell)(&fields[..self.n_fields])
+        self.cell.at(&fields[..self.n_fields])
     }
 }
 
@@ -215,9 +212,6 @@ impl<E: Env> Discretiser<E> for AnyCells {
     }
 }
 
-/// A function from the state's fields to the actions allowed there, at least one.
-pub type ShieldFn = Box<dyn FnMut(&[f64]) -> Result<ActionSet, Fault>>;
-
 /// A shield (Alshiekh et al. 2018): what it refuses is neither taken nor bootstrapped from. Asked
 /// of the state itself, not of its cell's representative: what it refuses anywhere in a cell must
 /// not happen there.
@@ -247,7 +241,7 @@ impl Shield {
         }
         let mut fields = [0.0; MAX_FIELDS];
         env.fields(obs, &mut fields);
-        let allowed = (self.allowed)(&fields[..self.n_fields])?;
+        let allowed = self.allowed.at(&fields[..self.n_fields])?;
         if let Some(index) = index {
             self.known[index] = Some(allowed);
         }

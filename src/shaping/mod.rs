@@ -11,8 +11,7 @@
 //! - [`potential_term`]: `γΦ(s′) − Φ(s)`, with Φ(terminal) = 0, in the one place where it is computed
 //!
 //! The training loop is generic over all three, so that the step compiles to straight code; scripts
-//! implement them through the function objects of [`ScriptedCells`], [`RawPotential`] and
-//! [`ScriptedReward`].
+//! implement them through [`CellFn`], [`PhiFn`] and [`StepFn`]: machine code, or the interpreter.
 
 mod bins;
 mod discretiser;
@@ -21,23 +20,25 @@ mod inputs;
 mod potential;
 mod reward;
 mod scale;
+mod scripted;
 
 pub use crate::mdp::MAX_FIELDS;
 pub use bins::{Bins, BinsError, Dim, MAX_CELLS};
 pub use discretiser::{
-    ActionSet, AnyCells, CellFn, Discretiser, Fields, RawFields, ScriptedCells, Seen, Shield,
-    ShieldFn, Shielded, ShieldedCells, StateIndex,
+    ActionSet, AnyCells, Discretiser, Fields, RawFields, ScriptedCells, Seen, Shield, Shielded,
+    ShieldedCells, StateIndex,
 };
 pub use features::{Active, FeatureKind, FeatureSpec, Features, Fourier, MAX_WEIGHTS, Tiles};
 pub use inputs::Inputs;
 pub use potential::{
     ActionFn, AnyPotential, CellEpisodeFn, CellPhiFn, CellPotential, EpisodePotential, NoPotential,
-    PhiFn, Potential, RawPotential, potential_term, shaped_model,
+    Potential, RawPotential, potential_term, shaped_model,
 };
 pub use reward::{
-    AnyReward, NativeReward, RewardFn, RewardModel, ScriptedReward, TabulatedReward, Transition,
+    AnyReward, NativeReward, RewardModel, ScriptedReward, TabulatedReward, Transition,
 };
 pub use scale::Scale;
+pub use scripted::{CellFn, PhiFn, ShieldFn, StepFn, StepLayout};
 
 /// A callback failed while training. Carries the script's own error, so that the floors above can
 /// show its place.

@@ -1,6 +1,6 @@
 //! Potentials Φ(s), and the shaping term they give (Ng, Harada & Russell 1999).
 
-use super::{Fault, MAX_FIELDS};
+use super::{Fault, MAX_FIELDS, PhiFn};
 use crate::mdp::{Env, FiniteMdp};
 
 /// The potential-based shaping term `F = γΦ(s′) − Φ(s)`.
@@ -130,9 +130,6 @@ impl<E: Env> Potential<E> for EpisodePotential {
     }
 }
 
-/// A function from the state's fields and the episode, counted from 1, to Φ.
-pub type PhiFn = Box<dyn FnMut(&[f64], u32) -> Result<f64, Fault>>;
-
 /// A function from the state's fields and an action to a number.
 pub type ActionFn = Box<dyn FnMut(&[f64], usize) -> Result<f64, Fault>>;
 
@@ -159,7 +156,7 @@ impl<E: Env> Potential<E> for RawPotential {
     fn phi(&mut self, env: &E, _cell: usize, obs: &E::Obs) -> Result<f64, Fault> {
         let mut fields = [0.0; MAX_FIELDS];
         env.fields(obs, &mut fields);
-        (self.phi)(&fields[..self.n_fields], self.episode)
+        self.phi.at(&fields[..self.n_fields], self.episode)
     }
 }
 

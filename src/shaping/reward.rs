@@ -1,6 +1,7 @@
 //! The reward an agent learns from: the native one, or a script's.
 
-use super::Fault;
+use super::scripted::StepInputs;
+use super::{Fault, StepFn};
 use crate::mdp::{Action, Env, FiniteMdp};
 
 /// One step as a reward model sees it.
@@ -121,12 +122,25 @@ impl<E: Env> RewardModel<E> for TabulatedReward {
     }
 }
 
-/// A function from a step, as a script sees it, to the learned reward.
-pub type RewardFn<E> =
-    Box<dyn FnMut(&E, &Transition<'_, <E as Env>::Obs>, &mut [f64]) -> Result<f64, Fault>>;
-
 /// A scripted reward, called at every step.
-pub struct ScriptedReward<E: Env>(pub RewardFn<E>);
+pub struct ScriptedReward<E: Env> {
+    /// Replaces the native reward.
+    reward: Option<StepFn<E>>,
+    /// Is added to it.
+    terms: Vec<StepFn<E>>,
+    /// Whether one of them reads the inputs.
+    is_compiled: bool,
+    inputs: Box<StepInputs>,
+}
+
+impl<E: Env> ScriptedReward<E> {
+    /// `reward` (the native one if `None`) plus `terms`, of steps between states of `n_fields`
+    /// fields.
+    pub fn new(reward: Option<StepFn<E>>, terms: Vec<StepFn<E>>, n_fields: usize) -> Self {
+        let is_compiled = reward.iter().chain(&terms).any(StepFn::is_compiled);
+        Self { reward, terms, is_compiled, inputs: Box::new(StepInputs::new(n_fields)) }
+    }
+}
 
 impl<E: Env> RewardModel<E> for ScriptedReward<E> {
     #[inline]
@@ -136,7 +150,19 @@ impl<E: Env> RewardModel<E> for ScriptedReward<E> {
         t: &Transition<'_, E::Obs>,
         terms: &mut [f64],
     ) -> Result<f64, Fault> {
-        (self.0)(env, t, terms)
+        if self.is_compiled {
+            self.inputs.fill(env, t);
+        }
+        let mut total = match &mut self.reward {
+            Some(reward) => reward.at(env, t, &self.inputs)?,
+            None => t.reward,
+        };
+        for (sum, term) in terms.iter_mut().zip(&mut self.terms) {
+            let term = term.at(env, t, &self.inputs)?;
+            *sum += term;
+            total += term;
+        }
+        Ok(total)
     }
 }
 

@@ -28,9 +28,10 @@ fn phi_at(plan: &Plan, variant: usize, row: u8, col: u8) -> f64 {
     let schema = variant.environment().unwrap().schema();
     let mut phi = host.callbacks().potential(potential(variant), &schema);
     let (row, col) = (f64::from(row), f64::from(col));
-    let first =
-        phi(&[row, col, 4.0 * row + col, f64::from(b'F')], 1).unwrap_or_else(|e| panic!("{e:?}"));
-    let again = phi(&[row, col, 4.0 * row + col, f64::from(b'F')], 1).unwrap();
+    let first = phi
+        .at(&[row, col, 4.0 * row + col, f64::from(b'F')], 1)
+        .unwrap_or_else(|e| panic!("{e:?}"));
+    let again = phi.at(&[row, col, 4.0 * row + col, f64::from(b'F')], 1).unwrap();
     assert_eq!(first.to_bits(), again.to_bits(), "a callback keeps nothing from call to call");
     first
 }
@@ -188,7 +189,7 @@ fn schedules_and_discretisers_as_written() {
         let DiscretiserSpec::Cells { shape, cell } = &variant.discretiser else { panic!() };
         let schema = variant.environment().unwrap().schema();
         let mut cells = host.callbacks().cells(cell, shape, &[], &schema);
-        assert_eq!(cells(&[0.0, 0.0]).unwrap(), expected);
+        assert_eq!(cells.at(&[0.0, 0.0]).unwrap(), expected);
     }
 }
 

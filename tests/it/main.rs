@@ -19,6 +19,7 @@ mod language;
 mod linear;
 mod models;
 mod mountain_car_tiles;
+mod native;
 mod numbers;
 mod parity;
 mod placing;

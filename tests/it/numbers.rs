@@ -123,7 +123,7 @@ fn integers_are_checked() {
         let host = Host::open(&plan).unwrap();
         let schema = variant.environment().unwrap().schema();
         let mut phi = host.callbacks().potential(potential(variant), &schema);
-        assert!(phi(&[0.0; 4], 1).is_err(), "{body}");
+        assert!(phi.at(&[0.0; 4], 1).is_err(), "{body}");
     }
 }
 

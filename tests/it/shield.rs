@@ -121,7 +121,7 @@ impl Temptation {
     fn tempt<E: Env + Clone>(name: &str, env: &E, agent: Box<dyn TabularAgent>) {
         let n_states = env.n_states().unwrap();
         // The lake's fields are row, column, index and tile.
-        let allowed: ShieldFn = Box::new(|fields| Ok(refused(fields[2] as usize)));
+        let allowed = ShieldFn::new(|fields| Ok(refused(fields[2] as usize)));
         let mut world = World {
             env: env.clone(),
             discretiser: ShieldedCells {
@@ -170,7 +170,7 @@ impl EnvVisitor for OneCell {
             env,
             discretiser: ShieldedCells {
                 cells: AnyCells::Bins(Bins::new(&[dim]).unwrap()),
-                shield: Shield::new(4, 0, Box::new(towards)),
+                shield: Shield::new(4, 0, ShieldFn::new(towards)),
             },
             potential: NoPotential,
             reward: NativeReward,
