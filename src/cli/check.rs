@@ -84,7 +84,7 @@ fn describe(plan: &Plan, tiers: &[Vec<CallbackTier>]) -> String {
 }
 
 /// Which callbacks are machine code, and why the others are not.
-fn runs(tiers: &[CallbackTier]) -> Vec<(&'static str, String)> {
+pub(super) fn runs(tiers: &[CallbackTier]) -> Vec<(&'static str, String)> {
     let (native, others): (Vec<_>, Vec<_>) = tiers.iter().partition(|t| t.is_native);
     let mut rows = Vec::new();
     if !native.is_empty() {

@@ -10,7 +10,7 @@ use std::time::Duration;
 use clap::Args as ClapArgs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use super::check::callbacks;
+use super::check::{callbacks, runs};
 use super::output::{diagnostic, note, out, palette};
 use super::{Failure, Outcome};
 use crate::experiment::{
@@ -24,6 +24,7 @@ use crate::report::tensorboard;
 use crate::script::{Host, Plan, SeedList, load};
 
 #[derive(Debug, ClapArgs)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct Args {
     /// The script
     script: PathBuf,
@@ -67,7 +68,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     for line in &checked.printed {
         note(line);
     }
-    if !args.quiet {
+    // Watched, every variant says it.
+    if !args.quiet && !args.watched {
         // Variants that share a callback say it once.
         let slow = checked.tiers.iter().flatten().filter(|tier| tier.is_slow);
         let lines: BTreeSet<String> =
@@ -101,9 +103,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.watched {
         let (ran, units) = (execution.finished.len(), execution.units.len());
         out(&format!("study \"{}\": {ran} of {units} units ran\n", plan.name))?;
-        for variant in &plan.variants {
-            for line in callbacks(variant) {
-                out(&format!("  {}: {} {}\n", variant.name, line.0, line.1))?;
+        for (variant, tiers) in plan.variants.iter().zip(&checked.tiers) {
+            for (what, how) in callbacks(variant).into_iter().chain(runs(tiers)) {
+                out(&format!("  {}: {what} {how}\n", variant.name))?;
             }
         }
         out(&format!("{}\n", curves_text(&curves, palette())))?;

@@ -158,7 +158,7 @@ impl Pass {
     fn ended(&mut self) -> Result<Option<Report>, Failure> {
         let Some(status) = self.child.try_wait()? else { return Ok(None) };
         // A thread that only reads does not panic.
-        let [report, remarks] =
+        let [result, remarks] =
             [0, 1].map(|i| self.written[i].take().and_then(|t| t.join().ok()).unwrap_or_default());
         let seconds = self.begun.elapsed().as_secs_f64();
         // With a code of 1 a claim does not hold, which is a result too.
@@ -167,7 +167,7 @@ impl Pass {
             Some(0..=2) => remarks,
             _ => format!("{remarks}error: the pass has ended early ({status})\n"),
         };
-        Ok(Some(Report { good, report, remarks, seconds }))
+        Ok(Some(Report { good, result, remarks, seconds }))
     }
 
     /// Asks it to stop, and waits until it has.
@@ -193,6 +193,9 @@ impl Drop for Pass {
 /// The command line of a pass.
 fn arguments(args: &Args) -> Vec<OsString> {
     let mut all: Vec<OsString> = vec!["exec".into(), "--watched".into()];
+    if !crate::jit::is_enabled() {
+        all.push("--no-jit".into());
+    }
     let mut add = |flag: &str, value: Option<OsString>| {
         if let Some(value) = value {
             all.extend([flag.into(), value]);

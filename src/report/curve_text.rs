@@ -56,7 +56,12 @@ pub fn curves_text(plot: &CurvesPlot, ink: Palette) -> String {
         Some(n) => format!(", rolling mean over {n} episodes"),
         None => ", rolling mean over each variant's own window".into(),
     };
-    let mut out = format!("{}{window}, mean over seeds\n", plot.quantity);
+    let off = match plot.threshold.filter(|&t| !y.holds(t)) {
+        Some(threshold) if threshold > high => format!("; solved at {}, above", number(threshold)),
+        Some(threshold) => format!("; solved at {}, below", number(threshold)),
+        None => String::new(),
+    };
+    let mut out = format!("{}{window}, mean over seeds{off}\n", plot.quantity);
     for (row, cells) in panel.iter().enumerate() {
         let solved = solved.is_some_and(|(at, _)| at == row);
         let label = label(row);
@@ -229,7 +234,8 @@ mod tests {
         let solved = text.lines().position(|l| l.ends_with("(solved)")).unwrap() - 1;
         assert!((TALL / 2 - 1..=TALL / 2).contains(&solved), "{text}");
         assert!(text.contains("50 ┤╌"), "{text}");
-        assert!(!curves_text(&plot(curves(), Some(1e6)), Palette::Plain).contains("solved"));
+        let far = curves_text(&plot(curves(), Some(1e6)), Palette::Plain);
+        assert!(far.contains("; solved at 1000000, above\n") && !far.contains('╌'), "{far}");
     }
 
     #[test]

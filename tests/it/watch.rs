@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crate::support::{SMALL, contents, expect_code, folder, run, runner, stderr, write};
 
 /// Far longer than anything here takes, on a machine that has much else to do.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_mins(2);
 
 struct Watcher {
     child: Child,

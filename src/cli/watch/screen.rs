@@ -16,7 +16,7 @@ pub(super) struct Report {
     /// Whether it came to a result.
     pub(super) good: bool,
     /// Its result, as `exec` prints it.
-    pub(super) report: String,
+    pub(super) result: String,
     /// Warnings and remarks, or the mistake that was made.
     pub(super) remarks: String,
     /// How long it took.
@@ -70,13 +70,13 @@ impl Screen {
     pub(super) fn show(&mut self, report: Report, files: &Snapshot) -> io::Result<()> {
         self.passes += 1;
         self.running = None;
-        let Report { good, report, remarks, seconds } = report;
+        let Report { good, result, remarks, seconds } = report;
         let mut text = String::new();
         let _ = writeln!(text, "pass {}, {seconds:.2} s", self.passes);
         text.push_str(&remarks);
         if good {
-            text.push_str(&report);
-            self.good = Some((self.passes, report));
+            text.push_str(&result);
+            self.good = Some((self.passes, result));
         } else if let Some((pass, last)) = &self.good {
             let _ = writeln!(text, "\nthe last result, of pass {pass}:");
             text.push_str(&self.fitting(last, text.lines().count()));

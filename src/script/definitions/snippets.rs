@@ -61,7 +61,7 @@ fn stop(i: usize, default: &str) -> String {
 fn experiment(spec: &EnvSpec) -> Vec<String> {
     let bins = match spec.example.bins {
         "" => None,
-        bins => Some(format!("    discretiser: bins(#{{ {} }}),", bins)),
+        bins => Some(format!("    discretiser: bins(#{{ {bins} }}),")),
     };
     let mut lines = vec![
         format!("let {} = experiment(#{{", stop(1, "plain")),

@@ -146,6 +146,11 @@ pub fn functions() -> Vec<Function> {
         .collect()
 }
 
+/// Whether there is a mathematical function called `name`.
+pub(super) fn is_mathematical(name: &str) -> bool {
+    mathematics::MATHEMATICS.iter().any(|f| f.name == name)
+}
+
 /// `cells(n, |s| i) or cells([n1, n2], |s| [i, j])`: calls that are written alike once.
 fn signature(name: &str, is_method: bool, calls: &[Call]) -> String {
     let mut written: Vec<String> = Vec::new();
