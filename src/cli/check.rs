@@ -84,7 +84,7 @@ fn describe(plan: &Plan, tiers: &[Vec<CallbackTier>]) -> String {
 }
 
 /// Which callbacks are machine code, and why the others are not.
-fn runs(tiers: &[CallbackTier]) -> Vec<(&'static str, String)> {
+pub(super) fn runs(tiers: &[CallbackTier]) -> Vec<(&'static str, String)> {
     let (native, others): (Vec<_>, Vec<_>) = tiers.iter().partition(|t| t.is_native);
     let mut rows = Vec::new();
     if !native.is_empty() {
@@ -144,6 +144,13 @@ fn rows(v: &Variant) -> Vec<(&'static str, String)> {
     if let Some(notes) = &v.notes {
         rows.push(("notes", notes.clone()));
     }
+    rows.extend(callbacks(v));
+    rows
+}
+
+/// The functions that shape what a variant learns from, and how each is called.
+pub(super) fn callbacks(v: &Variant) -> Vec<(&'static str, String)> {
+    let mut rows = Vec::new();
     if let Some(potential) = &v.potential {
         let on = match (&v.discretiser, v.potential_on) {
             (DiscretiserSpec::StateIndex, _) => "tabulated over the states",

@@ -3,20 +3,22 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use clap::Args as ClapArgs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use super::output::{diagnostic, note, out};
+use super::check::{callbacks, runs};
+use super::output::{diagnostic, note, out, palette};
 use super::{Failure, Outcome};
 use crate::experiment::{
     Audit, ExecuteError, Execution, Progress, audit_variant, check, execute, start_from,
 };
 use crate::report::claims::{judge, rehearse};
 use crate::report::closing::closing_table;
+use crate::report::curve_text::curves_text;
 use crate::report::results::{Findings, FolderError, Results};
 use crate::report::tensorboard;
 use crate::script::{Host, Plan, SeedList, load};
@@ -25,6 +27,7 @@ use crate::script::{Host, Plan, SeedList, load};
 const AT_ONCE: Duration = Duration::from_millis(200);
 
 #[derive(Debug, ClapArgs)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct Args {
     /// The script
     script: PathBuf,
@@ -52,6 +55,9 @@ pub(super) struct Args {
     /// Write the course of training for TensorBoard, into the folder `tensorboard` of the results
     #[arg(long)]
     tensorboard: bool,
+    /// What `runner watch` starts: prints the curves too, and stops when stdin ends
+    #[arg(long, hide = true)]
+    watched: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -65,7 +71,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     for line in &checked.printed {
         note(line);
     }
-    if !args.quiet {
+    // Watched, every variant says it.
+    if !args.quiet && !args.watched {
         // Variants that share a callback say it once.
         let slow = checked.tiers.iter().flatten().filter(|tier| tier.is_slow);
         let lines: BTreeSet<String> =
@@ -92,15 +99,25 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let host = Host::open(&plan)?;
     let audits: Vec<Audit> =
         plan.variants.iter().map(|v| audit_variant(&host, v, None)).collect::<Result<_, _>>()?;
-    let findings = results.derive(&plan, &execution, audits)?;
+    let (findings, curves) = results.derive(&plan, &execution, audits)?;
     if args.tensorboard {
         tensorboard::write(&results, &plan, &execution.units)?;
+    }
+    if args.watched {
+        let (ran, units) = (execution.finished.len(), execution.units.len());
+        out(&format!("study \"{}\": {ran} of {units} units ran\n", plan.name))?;
+        for (variant, tiers) in plan.variants.iter().zip(&checked.tiers) {
+            for (what, how) in callbacks(variant).into_iter().chain(runs(tiers)) {
+                out(&format!("  {}: {what} {how}\n", variant.name))?;
+            }
+        }
+        out(&format!("{}\n", curves_text(&curves, palette())))?;
     }
     if !args.quiet {
         out(&closing_table(&plan, &findings).render())?;
     }
     let held = expectations(&plan, &host, &findings, args.quiet)?;
-    if !args.quiet {
+    if !args.quiet && !args.watched {
         note(&format!("results in {}", folder.display()));
         if args.tensorboard {
             let events = folder.join(tensorboard::FOLDER);
@@ -164,6 +181,9 @@ fn train(
     });
     let total: u64 =
         plan.variants.iter().map(|v| u64::from(v.episodes) * v.seeds.0.len() as u64).sum();
+    if args.watched {
+        std::thread::spawn(|| stop_when_stdin_ends(&progress.stop));
+    }
     let bar = bar(total, args.quiet, progress);
     let result = std::thread::scope(|scope| {
         let (done, wait) = std::sync::mpsc::channel::<()>();
@@ -194,6 +214,13 @@ fn train(
             Ok(None)
         }
     }
+}
+
+/// Raises `stop` when whoever started this closes stdin, or is no more.
+fn stop_when_stdin_ends(stop: &AtomicBool) {
+    // Nothing is written to it; an error is an end too.
+    let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+    stop.store(true, Ordering::Relaxed);
 }
 
 /// The command that goes on where this one stopped.

@@ -10,7 +10,7 @@ use super::{Failure, Outcome};
 use crate::env::specs;
 use crate::learn::registry::AGENTS;
 use crate::mdp::ActionSpace;
-use crate::script::functions::functions;
+use crate::script::functions::{Group, functions as registered};
 use crate::script::keys::KEYS;
 
 #[derive(Debug, ClapArgs)]
@@ -37,7 +37,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let text = match args.what {
         What::Envs => envs()?,
         What::Agents => agents(),
-        What::Functions => rows(functions().iter().map(|f| (f.signature.as_str(), f.doc))),
+        What::Functions => functions(),
         What::Keys => keys(),
         What::Examples => examples(),
     };
@@ -47,11 +47,30 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 
 const MEMORY: &str = "writing to a string does not fail";
 
-fn rows<'a>(items: impl Iterator<Item = (&'a str, &'a str)>) -> String {
-    items.fold(String::new(), |mut text, (name, doc)| {
-        writeln!(text, "{name}\n    {doc}").expect(MEMORY);
-        text
-    })
+/// Builders and agents with a line of their own for what they do; functions of numbers, which say
+/// less, in columns.
+fn functions() -> String {
+    let all = registered();
+    let mut text = String::new();
+    let headings = [
+        (Group::Builder, "Building the plan"),
+        (Group::Agent, "Agents"),
+        (Group::Mathematics, "Mathematics"),
+        (Group::Standard, "Rhai's own, among others"),
+    ];
+    for (group, heading) in headings {
+        let functions = all.iter().filter(|f| f.group == group);
+        let columns = matches!(group, Group::Mathematics | Group::Standard);
+        writeln!(text, "{}{heading}", if text.is_empty() { "" } else { "\n" }).expect(MEMORY);
+        for f in functions {
+            if columns {
+                writeln!(text, "  {:<41} {}", f.signature, f.doc).expect(MEMORY);
+            } else {
+                writeln!(text, "  {}\n      {}", f.signature, f.doc).expect(MEMORY);
+            }
+        }
+    }
+    text
 }
 
 fn envs() -> Result<String, Failure> {

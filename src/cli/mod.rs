@@ -7,6 +7,7 @@
 mod audit;
 mod check;
 mod completions;
+mod definitions;
 mod exec;
 mod export;
 mod golden;
@@ -21,6 +22,7 @@ mod screen;
 mod show;
 mod supervise;
 mod view;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -46,6 +48,8 @@ enum Command {
     Exec(exec::Args),
     /// Compile scripts, call every callback on sampled states, print the plan
     Check(check::Args),
+    /// Run a script again at every save, and show what came of it
+    Watch(watch::Args),
     /// Say whether each shaping keeps the optimal policy, and prove it
     Audit(audit::Args),
     /// Rank the potentials of a study before training
@@ -68,6 +72,8 @@ enum Command {
     New(new::Args),
     /// Print shell completions
     Completions(completions::Args),
+    /// Write what editors can know of scripts: definitions for language servers, snippets
+    Definitions(definitions::Args),
 }
 
 /// How a command came out.
@@ -155,11 +161,14 @@ impl Command {
             | Self::Play(_)
             | Self::Export(_)
             | Self::Golden(_) => true,
-            Self::List(_)
+            // Each pass of `watch` is a process that does.
+            Self::Watch(_)
+            | Self::List(_)
             | Self::Rollout(_)
             | Self::Parity(_)
             | Self::New(_)
-            | Self::Completions(_) => false,
+            | Self::Completions(_)
+            | Self::Definitions(_) => false,
         }
     }
 }
@@ -188,6 +197,7 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
     }
     match cli.command {
         Command::Exec(args) => exec::run(&args),
+        Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Audit(args) => audit::run(&args),
         Command::Score(args) => score::run(&args),
@@ -200,5 +210,6 @@ fn run(cli: Cli) -> Result<Outcome, Failure> {
         Command::Golden(args) => golden::run(&args),
         Command::New(args) => new::run(&args),
         Command::Completions(args) => completions::run(&args),
+        Command::Definitions(args) => definitions::run(&args),
     }
 }

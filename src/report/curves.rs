@@ -183,7 +183,7 @@ fn description(plot: &CurvesPlot, subtitle: &str) -> String {
 }
 
 /// The range of the value axis, and a remark if it does not show all curves whole.
-fn value_range(plot: &CurvesPlot) -> (f64, f64, Option<String>) {
+pub(super) fn value_range(plot: &CurvesPlot) -> (f64, f64, Option<String>) {
     let (lowest, highest) = lines_range(plot, 0);
     if lowest > highest {
         return (0.0, 1.0, None); // No finite point at all.

@@ -6,7 +6,7 @@
 //! - [`manifest`] writes `study.json`
 //! - [`summary`]: per-variant statistics, as in `summary.json`
 //! - [`compare`]: variants against the baseline
-//! - [`curves`]: learning curves as SVG
+//! - [`curves`]: learning curves as SVG; [`curve_text`]: in the terminal
 //! - [`table`]: tables in the terminal; [`closing`]: the one that closes a study
 //! - [`picture`]: a table of action values over two of the state's fields; [`frame`]: which ones
 //! - [`heat_map`], [`value_map`]: pictures in the terminal; [`picture_svg`]: as SVG
@@ -23,6 +23,7 @@ pub mod closing;
 mod colours;
 mod columns;
 pub mod compare;
+pub mod curve_text;
 pub mod curves;
 pub mod frame;
 pub mod heat_map;

@@ -115,7 +115,7 @@ impl Results {
         plan: &Plan,
         execution: &Execution,
         audits: Vec<Audit>,
-    ) -> Result<Findings, StoreError> {
+    ) -> Result<(Findings, CurvesPlot), StoreError> {
         let steps_per_second = self.timing(plan, execution)?;
         let mut all = Vec::new();
         let path = self.folder.join("episodes.csv");
@@ -151,7 +151,7 @@ impl Results {
         write_atomically(&self.folder.join("curves.svg"), curves_svg(&plot).as_bytes())?;
         let path = self.folder.join("values.svg");
         match values_plot(plan, &all) {
-            Some(plot) => write_atomically(&path, curves_svg(&plot).as_bytes())?,
+            Some(values) => write_atomically(&path, curves_svg(&values).as_bytes())?,
             // That of another study of the same name, which was here before.
             None if path.exists() => {
                 std::fs::remove_file(&path)
@@ -159,7 +159,7 @@ impl Results {
             }
             None => {}
         }
-        Ok(Findings { summaries, audits, steps_per_second })
+        Ok((Findings { summaries, audits, steps_per_second }, plot))
     }
 
     fn summary(

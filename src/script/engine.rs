@@ -11,6 +11,7 @@ use rhai::{
 };
 
 use super::diagnostic::{Diagnostic, Place};
+use super::functions::CONSTANTS;
 use super::source::SourceSet;
 use super::syntax::Syntax;
 use super::watch::Watched;
@@ -165,17 +166,10 @@ fn constants_in_functions(engine: &mut Engine, context: &Rc<Context>) {
         }
         // The script's own constants come before the built-in ones.
         let own = context.constants.borrow().get(name).cloned();
-        Ok(own.or_else(|| match name {
-            "PI" => Some(std::f64::consts::PI.into()),
-            "E" => Some(std::f64::consts::E.into()),
-            "INF" => Some(f64::INFINITY.into()),
-            _ => None,
-        }))
+        let built_in = || CONSTANTS.iter().find(|c| c.name == name).map(|c| c.value.into());
+        Ok(own.or_else(built_in))
     });
 }
-
-/// Names that are always defined.
-pub(super) const BUILT_IN_CONSTANTS: &[&str] = &["PI", "E", "INF"];
 
 /// Compiles one file: parses it, records its syntax, and checks that every variable in it exists.
 pub(super) fn compile(
@@ -206,8 +200,9 @@ pub(super) fn compile(
     }
     // A `let` of the same name hides a built-in constant at the top level; in functions, which do
     // not see it, the name would silently mean something else.
-    for name in BUILT_IN_CONSTANTS.iter().filter(|n| syntax.variables.iter().all(|v| v != *n)) {
-        known.push_constant(*name, ());
+    let built_in = CONSTANTS.iter().map(|c| c.name);
+    for name in built_in.filter(|n| syntax.variables.iter().all(|v| v != n)) {
+        known.push_constant(name, ());
     }
     context.syntax.borrow_mut().insert(name.to_string(), syntax);
     let strict = {

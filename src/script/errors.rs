@@ -3,8 +3,8 @@
 use rhai::{EvalAltResult, ParseErrorType, Position};
 
 use super::diagnostic::{Diagnostic, Place, nearest};
-use super::engine::{BUILT_IN_CONSTANTS, Context};
-use super::functions::{MATHEMATICAL, functions};
+use super::engine::Context;
+use super::functions::{CONSTANTS, functions};
 use super::params::show;
 use super::sandbox;
 use super::watch::Stop;
@@ -83,7 +83,7 @@ fn undefined(context: &Context, source: &str, name: &str) -> Diagnostic {
     let own = syntax.constants.iter().chain(&syntax.variables).map(String::as_str);
     let own = own.chain(syntax.functions.iter().map(|f| f.0.as_str()));
     let known = own.chain(all.iter().map(|f| f.name));
-    let best = nearest(name, known.chain(BUILT_IN_CONSTANTS.iter().copied()));
+    let best = nearest(name, known.chain(CONSTANTS.iter().map(|c| c.name)));
     d.maybe_hint(best.map(|b| format!("did you mean `{b}`?")))
 }
 
@@ -198,9 +198,6 @@ fn not_found(context: &Context, signature: &str) -> Diagnostic {
     let args = types.join(", ");
     let bare = name.rsplit("::").next().unwrap_or(name);
     let all = functions();
-    if MATHEMATICAL.contains(&name) {
-        return Diagnostic::error(format!("`{name}` cannot be called with ({args})"));
-    }
     if let Some(known) = all.iter().find(|f| f.name == name) {
         return Diagnostic::error(format!("`{name}` cannot be called with ({args})"))
             .hint(format!("it is called as {}", known.signature));
@@ -228,6 +225,6 @@ fn not_found(context: &Context, signature: &str) -> Diagnostic {
         return d.hint(hint);
     }
     let known = own.iter().map(|(n, _)| n.as_str()).chain(all.iter().map(|f| f.name));
-    let best = nearest(bare, known.chain(MATHEMATICAL.iter().copied()));
+    let best = nearest(bare, known);
     d.maybe_hint(best.map(|b| format!("did you mean `{b}`?")))
 }

@@ -12,6 +12,7 @@
 
 mod builders;
 mod callback;
+pub mod definitions;
 mod diagnostic;
 mod draft;
 mod engine;
@@ -53,6 +54,6 @@ pub use plan::{
     StartModel, Variant,
 };
 pub use shaping::{AdviceOn, Shaping};
-pub use source::{Source, SourceSet};
+pub use source::{Snapshot, Source, SourceSet, snapshot};
 pub use value::Value;
 pub use watch::{read_ledger, start as start_watching};

@@ -167,6 +167,44 @@ impl SourceSet {
     }
 }
 
+/// Files with their bytes; `None` for one that cannot be read.
+pub type Snapshot = BTreeMap<PathBuf, Option<Vec<u8>>>;
+
+/// The script at `path` and every file that it imports, directly or through others, missing ones
+/// included. Nothing is run: imports are found in the text.
+pub fn snapshot(path: &Path) -> Snapshot {
+    let root = path.parent().unwrap_or(Path::new(""));
+    let mut files = Snapshot::new();
+    // By their paths relative to the root; `None` for the script.
+    let mut todo: Vec<Option<String>> = vec![None];
+    while let Some(relative) = todo.pop() {
+        let file = relative.as_ref().map_or(path.to_path_buf(), |relative| root.join(relative));
+        if files.contains_key(&file) {
+            continue;
+        }
+        let bytes = beginning(&file);
+        let text = bytes.as_ref().map_or("".into(), |bytes| String::from_utf8_lossy(bytes));
+        let found = tokens(&text);
+        let imports = found.windows(2).filter(|pair| pair[0].text == "import");
+        let imports = imports.filter_map(|pair| {
+            let path = pair[1].text.strip_prefix(['"', '`'])?.strip_suffix(['"', '`'])?;
+            resolve_import(relative.as_deref(), path).ok()
+        });
+        todo.extend(imports.map(Some));
+        files.insert(file, bytes);
+    }
+    files
+}
+
+/// A file's bytes, as many as a script may have and one more.
+fn beginning(path: &Path) -> Option<Vec<u8>> {
+    // A pipe would block.
+    let file = path.is_file().then(|| std::fs::File::open(path).ok()).flatten()?;
+    let mut bytes = Vec::new();
+    file.take(MAX_SOURCE + 1).read_to_end(&mut bytes).ok()?;
+    Some(bytes)
+}
+
 /// `path` seen from the file `from`, normalised, with `.rhai` added if it has no extension.
 pub(super) fn resolve_import(from: Option<&str>, path: &str) -> Result<String, Diagnostic> {
     let outside = || {
@@ -291,6 +329,28 @@ mod tests {
         for bad in ["../x", "/etc/passwd", "lib/../../x", "C:x", "a\\b"] {
             assert!(resolve_import(None, bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_snapshot_has_the_script_and_all_its_imports() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let script = write("s.rhai", "import \"lib/a\" as a; // import \"no\" as no\nlet x = 1;");
+        // In a circle, and one that is not there.
+        write("lib/a.rhai", "import `b` as b; import \"../s\" as s; import \"../../out\" as o;");
+        let seen = snapshot(&script);
+        let names: Vec<_> = seen.keys().map(|p| p.strip_prefix(dir.path()).unwrap()).collect();
+        assert_eq!(names, [Path::new("lib/a.rhai"), Path::new("lib/b.rhai"), Path::new("s.rhai")]);
+        assert!(seen[&dir.path().join("lib/b.rhai")].is_none());
+        write("lib/b.rhai", "1");
+        assert_ne!(snapshot(&script), seen);
+        std::fs::remove_file(&script).unwrap();
+        assert_eq!(snapshot(&script), Snapshot::from([(script, None)]));
     }
 
     #[test]

@@ -105,8 +105,16 @@ fn names() -> &'static BTreeSet<&'static str> {
     })
 }
 
-const STEP_FIELDS: [&str; 7] =
-    ["state", "action", "reward", "next_state", "terminated", "truncated", "step"];
+/// What a step has: names, types as definition files write them, meanings.
+pub(super) const STEP_FIELDS: [(&str, &str, &str); 7] = [
+    ("state", "?", "The state before it: fields as of the environment's states"),
+    ("action", "int", "The action's number"),
+    ("reward", "float", "What the environment paid"),
+    ("next_state", "?", "The state after it"),
+    ("terminated", "bool", "Whether the episode ended in a terminal state"),
+    ("truncated", "bool", "Whether the time limit cut the episode off"),
+    ("step", "int", "Its number in the episode, from 0"),
+];
 
 /// Registers both types with their properties.
 pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
@@ -168,7 +176,7 @@ pub(super) fn register(engine: &mut Engine, context: &Rc<Context>) {
             }
             _ => {
                 let diagnostic = Diagnostic::error(format!("a step has no field `{name}`"));
-                return fail(diagnostic.maybe_hint(suggest(name, STEP_FIELDS)));
+                return fail(diagnostic.maybe_hint(suggest(name, STEP_FIELDS.map(|f| f.0))));
             }
         })
     });

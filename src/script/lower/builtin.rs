@@ -99,9 +99,7 @@ impl Lowering<'_> {
         };
         match result {
             Some(result) => Ok(Val::Num(result)),
-            None if known(name) => {
-                outside(format!("`{name}` of arguments that it does not take"), position)
-            }
+            None if known(name) => outside(format!("`{name}` of these arguments"), position),
             None => outside(format!("`{name}`"), position),
         }
     }
@@ -328,5 +326,5 @@ fn is_operator(name: &str) -> bool {
 
 /// Whether there is a mathematical function of that name.
 fn known(name: &str) -> bool {
-    is_operator(name) || crate::script::functions::MATHEMATICAL.contains(&name)
+    is_operator(name) || crate::script::functions::is_mathematical(name)
 }
