@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 const LONG: &str = "fn slow(t) { let x = 0.0; for i in 0..3000 { x += 1.0; } x }
 experiment(#{
     name: \"long\",
-    env: \"FrozenLake-v1\",
+    env: \"CartPole-v1\",
     agent: q_learning(),
+    discretiser: bins(#{ theta: [-0.2, 0.2, 6] }),
     reward: slow,
     terms: #{ more: |t| t.step },
     episodes: 1000000,
@@ -20,7 +21,7 @@ experiment(#{
 fn begin(folder: &Path) -> Child {
     std::fs::write(folder.join("long.rhai"), LONG).unwrap();
     Command::new(env!("CARGO_BIN_EXE_runner"))
-        .args(["exec", "long.rhai", "--quiet", "--jobs", "1"])
+        .args(["exec", "long.rhai", "--quiet", "--no-jit", "--jobs", "1"])
         .current_dir(folder)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
@@ -101,7 +102,9 @@ fn signals_reach_the_child_once() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("long.rhai"), LONG).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_runner"));
-        command.args(["exec", "long.rhai", "--quiet", "--jobs", "1"]).current_dir(folder.path());
+        command
+            .args(["exec", "long.rhai", "--quiet", "--no-jit", "--jobs", "1"])
+            .current_dir(folder.path());
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
         let parent = std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let parent = parent.spawn().unwrap();

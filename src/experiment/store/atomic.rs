@@ -68,7 +68,18 @@ pub(super) fn is_stale(name: &str) -> bool {
     let Some(pid) = rest.split('-').next().and_then(|p| p.parse::<u32>().ok()) else {
         return false;
     };
-    pid != std::process::id()
-        && cfg!(target_os = "linux")
-        && !Path::new(&format!("/proc/{pid}")).exists()
+    pid != std::process::id() && cfg!(target_os = "linux") && !runs(pid)
+}
+
+/// Whether a process of this machine runs. One that has been killed may take a while to vanish,
+/// longer than whoever waited for the process that it belonged to.
+fn runs(pid: u32) -> bool {
+    const KILLED: u64 = 1 << 8;
+    let Ok(status) = fs::read_to_string(format!("/proc/{pid}/status")) else {
+        return Path::new(&format!("/proc/{pid}")).exists();
+    };
+    let field = |name: &str| status.lines().find_map(|l| l.strip_prefix(name)).map(str::trim);
+    let is_dead = field("State:").is_some_and(|state| state.starts_with(['Z', 'X']));
+    let pending = field("ShdPnd:").and_then(|mask| u64::from_str_radix(mask, 16).ok());
+    !is_dead && pending.unwrap_or(0) & KILLED == 0
 }
