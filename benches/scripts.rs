@@ -413,7 +413,10 @@ fn main() {
 /// Where the time of a step goes, for every sample script: what its parts cost alone, and what is
 /// left for the learner and the loop.
 mod parts {
-    use super::*;
+    use super::{
+        AtomicBool, Bins, DiscretiserSpec, Env, EnvVisitor, Host, Instant, MAX_FIELDS, NumpyRng,
+        Plan, RewardModel, Stream, Transition, Variant, black_box, median, run_unit,
+    };
 
     /// Nanoseconds per step.
     pub(super) struct Parts {
