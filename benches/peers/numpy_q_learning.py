@@ -30,27 +30,43 @@ def cartpole():
             for x, e, n in zip(observation, edges, shape)
         )
 
-    return gym.make("CartPole-v1"), shape, discretise, None
+    return gym.make("CartPole-v1"), shape, discretise, None, None
+
+
+def cartpole_scripted():
+    """The same with a potential and a reward of its own, as in cartpole_scripted.rhai."""
+    env, shape, discretise, *_ = cartpole()
+
+    def potential(observation):
+        _, _, theta, theta_dot = observation
+        return -20.0 * abs(theta) - 2.0 * abs(theta_dot + 4.0 * theta)
+
+    def paid(reward, observation, terminated):
+        if terminated:
+            return -1.0
+        return reward - 0.5 if abs(observation[0]) > 1.2 else reward
+
+    return env, shape, discretise, potential, paid
 
 
 def frozen_lake():
     """FrozenLake-v1 8x8 with 200 steps an episode, as in frozen_lake.rhai."""
     env = gym.make("FrozenLake-v1", map_name="8x8", max_episode_steps=200)
-    return env, (env.observation_space.n,), lambda observation: observation, None
+    return env, (env.observation_space.n,), lambda observation: observation, None, None
 
 
 def frozen_lake_shaped():
     """The same with a distance potential, as in frozen_lake_shaped.rhai."""
-    env, shape, discretise, _ = frozen_lake()
+    env, shape, discretise, *_ = frozen_lake()
 
     def potential(observation):
         row, col = divmod(observation, 8)
         return 1.0 - 0.05 * (abs(row - 7) + abs(col - 7))
 
-    return env, shape, discretise, potential
+    return env, shape, discretise, potential, None
 
 
-def train(env, shape, discretise, potential, episodes, seed):
+def train(env, shape, discretise, potential, paid, episodes, seed):
     """Plays `episodes` episodes; returns the number of steps."""
     rng = np.random.default_rng(seed)
     n_actions = int(env.action_space.n)
@@ -68,6 +84,8 @@ def train(env, shape, discretise, potential, episodes, seed):
                 action = int(np.argmax(q[state]))
             observation, reward, terminated, truncated, _ = env.step(action)
             next_state = discretise(observation)
+            if paid:
+                reward = paid(reward, observation, terminated)
             if potential:
                 phi_next = 0.0 if terminated else potential(observation)
                 reward += GAMMA * phi_next - phi
@@ -81,7 +99,7 @@ def train(env, shape, discretise, potential, episodes, seed):
     return steps
 
 
-TASKS = {f.__name__: f for f in (cartpole, frozen_lake, frozen_lake_shaped)}
+TASKS = {f.__name__: f for f in (cartpole, cartpole_scripted, frozen_lake, frozen_lake_shaped)}
 
 
 def main():

@@ -34,6 +34,7 @@ ROOT = HERE.parent.parent
 # task: episodes per seed, which take the peer some five seconds; seeds for runner's three.
 TASKS = {
     "cartpole": (6000, 100),
+    "cartpole_scripted": (6000, 100),
     "frozen_lake": (8000, 200),
     "frozen_lake_shaped": (8000, 200),
 }

@@ -112,7 +112,12 @@ impl Lowering<'_> {
             }
             Some((_, ty)) => {
                 let (was, is) = (type_name(self.program.locals[local]), type_name(ty));
-                outside(format!("`{name}`, which holds {was} first and {is} later"), position)
+                let hint = match ty {
+                    ir::Type::Float => " (let it start as 0.0, not 0)",
+                    _ => "",
+                };
+                let what = format!("`{name}`, which holds {was} first and {is} later{hint}");
+                outside(what, position)
             }
             None => outside(format!("{} in a variable that changes", val.described()), position),
         }

@@ -151,7 +151,11 @@ fn regressions() {
 fn what_lies_outside_is_named_with_its_place() {
     for (body, what, line) in [
         ("let s = \"a\" + 1;\n1.0", "`+` of a string", 1),
-        ("1.0;\nlet x = 0;\nx = 0.5;\nx", "`x`, which holds an integer first and a float later", 3),
+        (
+            "1.0;\nlet x = 0;\nx = 0.5;\nx",
+            "`x`, which holds an integer first and a float later (let it start as 0.0, not 0)",
+            3,
+        ),
         ("let a = [1.0];\na[0] = 2.0;\n1.0", "an array in a variable that changes", 1),
         ("print(1);\n1.0", "`print`", 1),
         ("try { 1.0 } catch { 2.0 }", "`try`", 1),
