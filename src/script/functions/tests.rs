@@ -91,8 +91,8 @@ fn every_agent_takes_its_own_defaults() {
 /// place of something that scripts must not have.
 const OUR_OWN: [&str; 5] = ["to_debug", "name", "sleep", "get_fn_metadata_list", "replace"];
 
-/// The names that the sources of the host register: every literal after `register_fn(`, and in
-/// `numeric.rs` those of its tables.
+/// The names that the sources of the host register: every literal after `register_fn(`, in
+/// `numeric.rs` those of its tables, and the functions that machine code can call.
 fn registered() -> BTreeSet<String> {
     fn scan(folder: &Path, found: &mut BTreeSet<String>) {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -116,6 +116,7 @@ fn registered() -> BTreeSet<String> {
     }
     let mut found = BTreeSet::new();
     scan(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/script"), &mut found);
+    found.extend(crate::jit::math::UNARY.iter().map(|(name, _)| name.to_string()));
     found
 }
 
