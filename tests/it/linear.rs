@@ -255,7 +255,7 @@ fn check_says_how_many_weights_there_are_and_what_holds_of_the_potential() {
     assert_eq!(stderr(&output), "");
     let said = stdout(&output);
     assert!(said.contains("4 tilings of 8 × 4 tiles, 180 features, 540 weights"), "{said}");
-    assert!(said.contains("on the state itself, interpreted at every step"), "{said}");
+    assert!(said.contains("on the state itself, at every step"), "{said}");
 }
 
 /// Ranges are in the units that the agent sees.
