@@ -104,25 +104,26 @@ const SAMPLES: [Sample; 5] = [
     },
 ];
 
-/// A function of fields.
-type Call = dyn FnMut(&[f64]) -> f64;
-
-/// The callback of `sample` as it is run now: native, or interpreted.
-fn callback(sample: &Sample) -> Box<Call> {
+/// Nanoseconds of a call of `sample`'s callback as it is run now: native, or interpreted.
+fn called(sample: &Sample, rounds: usize) -> f64 {
     let plan = load(Path::new(sample.script)).unwrap_or_else(|d| panic!("{}: {d}", sample.name));
     let host = Host::open(&plan).expect("it was loaded");
     let variant = &plan.variants[sample.variant];
     let schema = variant.environment().expect("it was resolved").schema();
+    let states = states(sample.scale);
+    let same = |state: &[f64], x: f64| assert_eq!(x, (sample.rust)(state), "{}", sample.name);
     if sample.is_cell {
         let DiscretiserSpec::Cells { shape, cell } = &variant.discretiser else {
             panic!("{}: no cells", sample.name)
         };
         let mut cells = host.callbacks().cells(cell, shape, &[], &schema);
-        Box::new(move |fields| cells.at(fields).expect("a cell") as f64)
+        states.iter().for_each(|s| same(s, cells.at(s).expect("a cell") as f64));
+        nanoseconds(&states, rounds, |fields| cells.at(fields).expect("a cell") as f64)
     } else {
         let potential = variant.potential.as_ref().expect("it has one");
         let mut phi = host.callbacks().potential(potential, &schema);
-        Box::new(move |fields| phi.at(fields, 1).expect("a number"))
+        states.iter().for_each(|s| same(s, phi.at(s, 1).expect("a number")));
+        nanoseconds(&states, rounds, |fields| phi.at(fields, 1).expect("a number"))
     }
 }
 
@@ -131,13 +132,9 @@ pub(super) fn compiled() -> Vec<(f64, f64, f64)> {
     let mut calls = Vec::new();
     for sample in &SAMPLES {
         let states = states(sample.scale);
-        let mut native = callback(sample);
-        for state in &states {
-            assert_eq!(native(state), (sample.rust)(state), "{}", sample.name);
-        }
         let rust = black_box(sample.rust);
         let floor = nanoseconds(&states, 101, black_box(|s: &[f64]| s[0]));
-        calls.push((nanoseconds(&states, 101, rust), nanoseconds(&states, 101, native), floor));
+        calls.push((nanoseconds(&states, 101, rust), called(sample, 101), floor));
     }
     calls
 }
@@ -145,7 +142,7 @@ pub(super) fn compiled() -> Vec<(f64, f64, f64)> {
 /// Prints what calls cost, now that they are interpreted.
 pub(super) fn report(out: &mut impl Write, calls: Vec<(f64, f64, f64)>) {
     for (sample, (rust, native, floor)) in SAMPLES.iter().zip(calls) {
-        let interpreted = nanoseconds(&states(sample.scale), 5, callback(sample));
+        let interpreted = called(sample, 5);
         writeln!(
             out,
             "{}: Rust {rust:.1} ns, native {native:.1} ns, {:.2} times; interpreted {interpreted:.0} \

@@ -251,7 +251,7 @@ impl Callbacks {
         let schema = Rc::new(schema.clone());
         let reward = reward.map(|callback| self.of_step(callback, "the reward", &schema));
         let terms = terms.iter().map(|callback| self.of_step(callback, "the term", &schema));
-        ScriptedReward::new(reward, terms.collect(), schema.fields.len())
+        ScriptedReward::new(reward, terms.collect())
     }
 
     /// `callback` as a number of a step, called `what` in messages.

@@ -75,8 +75,7 @@ impl Callbacks {
             Ok(program) => program,
             Err(reason) => return Tier::Interpreted(reason),
         };
-        let reads_step =
-            role == Role::OfStep && program.reads(StepLayout::new(schema.fields.len()).step);
+        let reads_step = role == Role::OfStep && program.reads(StepLayout::STEP);
         let tier = match role {
             Role::Cells(_) | Role::Shield | Role::Policy => {
                 Kernel::new(program).map(|kernel| Tier::Integer(Arc::new(kernel)))
@@ -99,7 +98,7 @@ impl Callbacks {
     ) -> Result<Program, Reason> {
         let n = schema.fields.len();
         let (params, n_inputs): (&[Param], usize) = match (role, callback.arity) {
-            (Role::OfStep, _) => (&[Param::Step], StepLayout::new(n).len),
+            (Role::OfStep, _) => (&[Param::Step], StepLayout::LEN),
             (Role::Cells(_) | Role::Policy, _) | (_, 1) => (&[Param::State(0)], n),
             _ => (&[Param::State(0), Param::Int(n)], n + 1),
         };

@@ -134,11 +134,10 @@ pub struct ScriptedReward<E: Env> {
 }
 
 impl<E: Env> ScriptedReward<E> {
-    /// `reward` (the native one if `None`) plus `terms`, of steps between states of `n_fields`
-    /// fields.
-    pub fn new(reward: Option<StepFn<E>>, terms: Vec<StepFn<E>>, n_fields: usize) -> Self {
+    /// `reward` (the native one if `None`) plus `terms`.
+    pub fn new(reward: Option<StepFn<E>>, terms: Vec<StepFn<E>>) -> Self {
         let is_compiled = reward.iter().chain(&terms).any(StepFn::is_compiled);
-        Self { reward, terms, is_compiled, inputs: Box::new(StepInputs::new(n_fields)) }
+        Self { reward, terms, is_compiled, inputs: Box::new(StepInputs::new()) }
     }
 }
 

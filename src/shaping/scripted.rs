@@ -7,9 +7,6 @@ use super::{ActionSet, Fault, Scale, Transition};
 use crate::jit::Kernel;
 use crate::mdp::{Env, MAX_FIELDS};
 
-/// The largest number of inputs of a function: two states and the rest of a step.
-const MAX_INPUTS: usize = 2 * MAX_FIELDS + 5;
-
 /// Φ as the interpreter has it.
 type ScriptPhi = dyn FnMut(&[f64], u32) -> Result<f64, Fault>;
 /// A cell as the interpreter has it.
@@ -193,7 +190,7 @@ impl<E: Env> StepFn<E> {
         Self { kernel: None, script: Box::new(script) }
     }
 
-    /// Asks `kernel` first, whose inputs are those of [`StepInputs`].
+    /// Asks `kernel` first, whose inputs are those of [`StepLayout`].
     #[must_use]
     pub fn with_kernel(mut self, kernel: Option<Arc<Kernel<f64>>>) -> Self {
         self.kernel = kernel;
@@ -208,7 +205,7 @@ impl<E: Env> StepFn<E> {
         inputs: &StepInputs,
     ) -> Result<f64, Fault> {
         if let Some(kernel) = &self.kernel {
-            let number = kernel.call(inputs.numbers());
+            let number = kernel.call(&inputs.0);
             if number.is_finite() {
                 return Ok(number);
             }
@@ -221,70 +218,48 @@ impl<E: Env> StepFn<E> {
     }
 }
 
-/// Where a step's parts are among the inputs of a function of a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StepLayout {
-    /// The fields of the state before the step, from here on.
-    pub state: usize,
-    /// The fields of the state after it, from here on.
-    pub next_state: usize,
-    /// The action.
-    pub action: usize,
-    /// The native reward.
-    pub reward: usize,
-    /// 1 if the state after it is terminal, else 0.
-    pub terminated: usize,
-    /// 1 if the time limit ends the episode here, else 0.
-    pub truncated: usize,
-    /// Which step of the episode it is, from 0.
-    pub step: usize,
-    /// How many inputs there are.
-    pub len: usize,
-}
+/// Where a step's parts are among the inputs of a function of a step: the same for every environment,
+/// so that laying one out is straight code.
+#[derive(Debug, Clone, Copy)]
+pub struct StepLayout;
 
 impl StepLayout {
-    /// For states of `n` fields.
-    pub fn new(n: usize) -> Self {
-        Self {
-            state: 0,
-            next_state: n,
-            action: 2 * n,
-            reward: 2 * n + 1,
-            terminated: 2 * n + 2,
-            truncated: 2 * n + 3,
-            step: 2 * n + 4,
-            len: 2 * n + 5,
-        }
-    }
+    /// The fields of the state before the step, from here on.
+    pub const STATE: usize = 0;
+    /// The fields of the state after it, from here on.
+    pub const NEXT_STATE: usize = MAX_FIELDS;
+    /// The action.
+    pub const ACTION: usize = 2 * MAX_FIELDS;
+    /// The native reward.
+    pub const REWARD: usize = Self::ACTION + 1;
+    /// 1 if the state after it is terminal, else 0.
+    pub const TERMINATED: usize = Self::ACTION + 2;
+    /// 1 if the time limit ends the episode here, else 0.
+    pub const TRUNCATED: usize = Self::ACTION + 3;
+    /// Which step of the episode it is, from 0.
+    pub const STEP: usize = Self::ACTION + 4;
+    /// How many inputs there are.
+    pub const LEN: usize = Self::ACTION + 5;
 }
 
 /// A step as the inputs of a function: laid out once for all functions of it.
-pub(super) struct StepInputs {
-    numbers: [f64; MAX_INPUTS],
-    at: StepLayout,
-}
+pub(super) struct StepInputs([f64; StepLayout::LEN]);
 
 impl StepInputs {
-    /// For states of `n_fields` fields.
-    pub(super) fn new(n_fields: usize) -> Self {
-        Self { numbers: [0.0; MAX_INPUTS], at: StepLayout::new(n_fields) }
-    }
-
-    #[inline]
-    fn numbers(&self) -> &[f64] {
-        &self.numbers[..self.at.len]
+    pub(super) fn new() -> Self {
+        Self([0.0; StepLayout::LEN])
     }
 
     /// Lays out `t`.
     #[inline]
     pub(super) fn fill<E: Env>(&mut self, env: &E, t: &Transition<'_, E::Obs>) {
-        let at = self.at;
-        env.fields(t.state, &mut self.numbers[at.state..at.next_state]);
-        env.fields(t.next_state, &mut self.numbers[at.next_state..at.action]);
-        self.numbers[at.action] = t.action as f64;
-        self.numbers[at.reward] = t.reward;
-        self.numbers[at.terminated] = f64::from(u8::from(t.terminated));
-        self.numbers[at.truncated] = f64::from(u8::from(t.truncated));
-        self.numbers[at.step] = f64::from(t.step);
+        let Self(numbers) = self;
+        env.fields(t.state, &mut numbers[StepLayout::STATE..StepLayout::NEXT_STATE]);
+        env.fields(t.next_state, &mut numbers[StepLayout::NEXT_STATE..StepLayout::ACTION]);
+        numbers[StepLayout::ACTION] = t.action as f64;
+        numbers[StepLayout::REWARD] = t.reward;
+        numbers[StepLayout::TERMINATED] = f64::from(u8::from(t.terminated));
+        numbers[StepLayout::TRUNCATED] = f64::from(u8::from(t.truncated));
+        numbers[StepLayout::STEP] = f64::from(t.step);
     }
 }

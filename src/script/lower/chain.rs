@@ -88,7 +88,7 @@ impl Lowering<'_> {
     fn property(&mut self, val: &Val, name: &str, position: Position) -> Lowered<Val> {
         match val {
             Val::State(offset) => self.field(*offset, name, position),
-            Val::Step => self.step_field(name, position),
+            Val::Step => Self::step_field(name, position),
             Val::Data(value) => match &**value {
                 Value::Map(entries) => Ok(entries.get(name).map_or(Val::Unit, Val::of)),
                 _ => outside(val.described(), position),
@@ -122,17 +122,16 @@ impl Lowering<'_> {
         }
     }
 
-    fn step_field(&mut self, name: &str, position: Position) -> Lowered<Val> {
-        let at = StepLayout::new(self.schema.fields.len());
+    fn step_field(name: &str, position: Position) -> Lowered<Val> {
         let input = |i, ty| Ok(Val::Num(ir::Expr::Input(i, ty)));
         match name {
-            "state" => Ok(Val::State(at.state)),
-            "next_state" => Ok(Val::State(at.next_state)),
-            "action" => input(at.action, Type::Int),
-            "reward" => input(at.reward, Type::Float),
-            "terminated" => input(at.terminated, Type::Bool),
-            "truncated" => input(at.truncated, Type::Bool),
-            "step" => input(at.step, Type::Int),
+            "state" => Ok(Val::State(StepLayout::STATE)),
+            "next_state" => Ok(Val::State(StepLayout::NEXT_STATE)),
+            "action" => input(StepLayout::ACTION, Type::Int),
+            "reward" => input(StepLayout::REWARD, Type::Float),
+            "terminated" => input(StepLayout::TERMINATED, Type::Bool),
+            "truncated" => input(StepLayout::TRUNCATED, Type::Bool),
+            "step" => input(StepLayout::STEP, Type::Int),
             _ => outside(format!("the unknown field `{name}`"), position),
         }
     }

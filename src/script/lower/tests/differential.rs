@@ -82,15 +82,14 @@ impl Step {
     }
 
     pub(super) fn inputs(&self) -> Vec<f64> {
-        let at = StepLayout::new(3);
-        let mut inputs = vec![0.0; at.len];
-        inputs[at.state..][..3].copy_from_slice(&self.state);
-        inputs[at.next_state..][..3].copy_from_slice(&self.next_state);
-        inputs[at.action] = self.action as f64;
-        inputs[at.reward] = self.reward;
-        inputs[at.terminated] = f64::from(u8::from(self.terminated));
-        inputs[at.truncated] = f64::from(u8::from(self.truncated));
-        inputs[at.step] = self.number as f64;
+        let mut inputs = vec![0.0; StepLayout::LEN];
+        inputs[StepLayout::STATE..][..3].copy_from_slice(&self.state);
+        inputs[StepLayout::NEXT_STATE..][..3].copy_from_slice(&self.next_state);
+        inputs[StepLayout::ACTION] = self.action as f64;
+        inputs[StepLayout::REWARD] = self.reward;
+        inputs[StepLayout::TERMINATED] = f64::from(u8::from(self.terminated));
+        inputs[StepLayout::TRUNCATED] = f64::from(u8::from(self.truncated));
+        inputs[StepLayout::STEP] = self.number as f64;
         inputs
     }
 }
@@ -123,7 +122,7 @@ impl Bench {
             function: name,
             captures: &[],
             params: &[Param::Step],
-            n_inputs: StepLayout::new(3).len,
+            n_inputs: StepLayout::LEN,
             want,
         };
         let host = &self.host;
