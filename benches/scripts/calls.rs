@@ -117,12 +117,16 @@ fn called(sample: &Sample, rounds: usize) -> f64 {
             panic!("{}: no cells", sample.name)
         };
         let mut cells = host.callbacks().cells(cell, shape, &[], &schema);
-        states.iter().for_each(|s| same(s, cells.at(s).expect("a cell") as f64));
+        for state in &states {
+            same(state, cells.at(state).expect("a cell") as f64);
+        }
         nanoseconds(&states, rounds, |fields| cells.at(fields).expect("a cell") as f64)
     } else {
         let potential = variant.potential.as_ref().expect("it has one");
         let mut phi = host.callbacks().potential(potential, &schema);
-        states.iter().for_each(|s| same(s, phi.at(s, 1).expect("a number")));
+        for state in &states {
+            same(state, phi.at(state, 1).expect("a number"));
+        }
         nanoseconds(&states, rounds, |fields| phi.at(fields, 1).expect("a number"))
     }
 }
