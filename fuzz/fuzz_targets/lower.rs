@@ -27,10 +27,12 @@ let a = 1;
 let agent = q_learning(#{{ alpha: 0.1, gamma: 0.9, epsilon: 0.1 }});
 let pole = experiment(#{{
     name: \"number\", env: \"CartPole-v1\", agent: agent, discretiser: bins(#{{ x: [-1.0, 1.0, 2] }}),
-    episodes: 1, seeds: 1, potential: p, allowed: p,
+    episodes: 1, seeds: 1, potential: p, potential_on: \"raw\",
+    allowed: p,
 }});
 let lake = experiment(#{{
-    name: \"lake\", env: \"FrozenLake-v1\", agent: agent, episodes: 1, seeds: 1, potential: p, allowed: p,
+    name: \"lake\", env: \"FrozenLake-v1\", agent: agent, episodes: 1, seeds: 1, potential: p, potential_on: \"raw\",
+    allowed: p,
 }});
 [pole, pole.with(#{{ name: \"cells\", discretiser: cells(9, c) }}), lake,
     lake.with(#{{ name: \"lake cells\", discretiser: cells(9, c) }})]
