@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         note(line);
     }
     // Watched, every variant says it.
-    if !args.quiet && !args.watched {
+    if !args.quiet && !args.watched && crate::jit::is_enabled() {
         // Variants that share a callback say it once.
         let slow = checked.tiers.iter().flatten().filter(|tier| tier.is_slow);
         let lines: BTreeSet<String> =

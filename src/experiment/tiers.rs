@@ -37,7 +37,7 @@ pub fn tiers(host: &Host, variant: &Variant) -> Result<Vec<CallbackTier>, Diagno
                     .as_ref()
                     .map_or(String::new(), |place| format!("line {}: ", place.line));
                 let cost = if is_often {
-                    "interpreted at every step, some 200 times slower"
+                    "interpreted at every step, each call some 200 times slower"
                 } else {
                     "interpreted, not at every step"
                 };

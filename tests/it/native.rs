@@ -104,7 +104,7 @@ fn check_says_how_callbacks_are_run() {
     fs::write(&script, slow).unwrap();
     let checked = check(&script, &[]);
     let line = "not native   reward: line 9: a string that is put together; interpreted at every step, \
-                some 200 times slower";
+                each call some 200 times slower";
     assert!(checked.stdout.contains(line), "{}", checked.stdout);
 }
 

@@ -71,6 +71,10 @@ fn comparison(name: &str) -> Option<Compare> {
 impl Lowering<'_> {
     /// What the operator or function `name` gives for `args`.
     pub(super) fn builtin(&mut self, name: &str, args: &[Val], position: Position) -> Lowered<Val> {
+        // What the operators `in` and `..` are called inside Rhai.
+        if matches!(name, "contains" | "..") {
+            return outside(if name == ".." { "a range" } else { "`in`" }, position);
+        }
         if args.iter().any(|v| matches!(v, Val::Never)) {
             return Ok(Val::Never);
         }

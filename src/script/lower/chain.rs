@@ -12,6 +12,10 @@ use crate::mdp::FieldKind;
 use crate::script::value::Value;
 use crate::shaping::StepLayout;
 
+/// Why an array of constants is no table.
+pub(super) const UNEVEN: &str =
+    "an array of other things than numbers of one type (write 1.0 for 1 among floats)";
+
 /// One link of a chain.
 enum Link<'e> {
     Property(&'e str),
@@ -165,7 +169,7 @@ impl Lowering<'_> {
                 }
                 match self.table(value) {
                     Some(slice) => self.slice_index(&slice, index, position),
-                    None => outside("an array of other things than numbers of one type", position),
+                    None => outside(UNEVEN, position),
                 }
             }
             Val::Slice { .. } => self.slice_index(val, index, position),

@@ -178,7 +178,10 @@ impl Lowering<'_> {
         };
         let ty = numbers[0].1;
         if numbers.iter().any(|(_, other)| *other != ty) {
-            return outside("an array of numbers of several types", position);
+            return outside(
+                "an array of numbers of several types (write 1.0 for 1 among floats)",
+                position,
+            );
         }
         if self.program.arrays.iter().map(|a| a.1).sum::<usize>() + numbers.len() > 1024 {
             return outside("arrays that are too long", position);

@@ -2,6 +2,7 @@
 
 use rhai::{Expr, FlowControl, Ident, Position, Token};
 
+use super::chain::UNEVEN;
 use super::value::{Binding, Slot, Val};
 use super::{Loop, Lowered, Lowering, outside};
 use crate::jit::ir::{self, Binary, Compare, Label, Stmt, Type};
@@ -153,7 +154,7 @@ impl Lowering<'_> {
             return match self.table(value) {
                 Some(slice) => Ok(Over::Array(slice, items.len())),
                 None if items.len() <= MAX_UNROLLED => Ok(Over::Written(items.clone())),
-                None => outside("an array of other things than numbers of one type", position),
+                None => outside(UNEVEN, position),
             };
         }
         match &val {

@@ -234,7 +234,7 @@ impl Lowering<'_> {
     fn count(&mut self, position: Position) -> Lowered<()> {
         self.cost += NODE_COST;
         if self.cost > NODE_COST * MAX_NODES {
-            return outside("a function that is too long with all it calls", position);
+            return outside("a function that is too long, with all that it calls", position);
         }
         Ok(())
     }
@@ -246,7 +246,10 @@ impl Lowering<'_> {
 
     fn local(&mut self, ty: Type, position: Position) -> Lowered<usize> {
         if self.program.locals.len() == MAX_LOCALS {
-            return outside("a function with too many variables", position);
+            return outside(
+                "too many variables, those of all functions that are called included",
+                position,
+            );
         }
         self.program.locals.push(ty);
         Ok(self.program.locals.len() - 1)

@@ -88,6 +88,9 @@ impl Lowering<'_> {
             ir::Expr::Binary(Binary::Int(how), value.clone().into(), ir::Expr::Int(x).into())
         };
         // By value, so that the order is the same in every process.
+        if cases.cases.len() > MAX_CASES {
+            return outside("a `switch` with too many cases", position);
+        }
         let file = self.file();
         let known = cases
             .cases
