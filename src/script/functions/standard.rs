@@ -88,6 +88,11 @@ pub(super) const STANDARD: &[Known] = &[
     method("reverse", &[call(&[ARRAY], "()", "[1, 2].reverse()")], "turns it round"),
     method("sort", &[call(&[ARRAY], "()", "[2, 1].sort()")], "sorts it"),
     method(
+        "sort_desc",
+        &[call(&[ARRAY], "()", "[1, 2].sort_desc()")],
+        "sorts it, the largest first",
+    ),
+    method(
         "split",
         &[call(&[TEXT, arg("delimiter", "String")], "Array", "\"a,b\".split(\",\")")],
         "the parts of a text",
