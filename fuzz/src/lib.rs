@@ -11,7 +11,7 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// The script being loaded. Several processes fuzz at a time, each with a file of its own.
 static FILE: LazyLock<PathBuf> = LazyLock::new(|| {
-    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/work"));
+    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/scratch"));
     std::fs::create_dir_all(&folder).expect("the folder can be made");
     // The program would end the process of a script that cannot be stopped; here libFuzzer does, and
     // tells such inputs from those that crash.
