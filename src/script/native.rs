@@ -90,7 +90,7 @@ impl Callbacks {
     }
 
     /// `callback` in the intermediate form.
-    fn program(
+    pub(super) fn program(
         &self,
         callback: &Callback,
         role: Role<'_>,
@@ -150,11 +150,11 @@ impl Callbacks {
 
     /// The callbacks of `variant`, whose states have this `schema`, by their keys, each with how it
     /// is run.
-    pub fn tiers(&self, variant: &Variant, schema: &Schema) -> Vec<Tiered> {
+    pub fn tiers<'v>(&self, variant: &'v Variant, schema: &Schema) -> Vec<Tiered<'v>> {
         let mut all = Vec::new();
-        let mut add = |key: String, callback: Option<&Callback>, role: Role<'_>| {
+        let mut add = |key: String, callback: Option<&'v Callback>, role: Role<'_>| {
             if let Some(callback) = callback {
-                all.push(Tiered { key, tier: self.tier(callback, role, schema) });
+                all.push(Tiered { key, callback, tier: self.tier(callback, role, schema) });
             }
         };
         if let DiscretiserSpec::Cells { shape, cell } = &variant.discretiser {
@@ -176,9 +176,11 @@ impl Callbacks {
 }
 
 /// A callback with how it is run.
-pub struct Tiered {
+pub struct Tiered<'v> {
     /// Its key in the experiment: `potential`, `terms.fuel`.
     pub key: String,
+    /// The callback.
+    pub callback: &'v Callback,
     /// How it is run.
     pub tier: Tier,
 }
